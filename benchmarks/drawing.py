@@ -21,7 +21,7 @@ if __name__ == "__main__":
     # Import from the root: a program in this folder has the same name as a package.
     sys.path[0] = str(Path(__file__).parents[1])
 
-from benchmarks.renderer import mesh_of
+from benchmarks.renderer import geometry_of
 from renderer.drawing.drawing import Drawing
 from renderer.drawing.opengl import open_context
 from renderer.encoding.encoder import jpeg, open_encoder
@@ -30,7 +30,7 @@ from renderer.pictures.overlay import Overlay, Row, write_over
 from renderer.scene.cameras import Camera, fitted
 from renderer.scene.scene import Part, Scene
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_meshes
+from robots.descriptions.glb import link_glbs
 from robots.kinematics.model import build_model, link_placements
 
 SIZES = ((640, 360), (854, 480), (1280, 720), (1920, 1080))
@@ -64,18 +64,18 @@ def measure(robot: str, device: int | None, triangles: str, pictures: int) -> di
     """Return the medians [ms] of each step for each size and anti-aliasing."""
     description = load(robot)
     model = build_model(description)
-    meshes = {name: mesh_of(glb, triangles) for name, glb in link_meshes(description).items()}
+    shapes = {name: geometry_of(glb, triangles) for name, glb in link_glbs(description).items()}
     rows = []
     for size, samples in product(SIZES, (0, 4)):
         drawing = Drawing(open_context(device), size, samples=samples)
-        for name, mesh in meshes.items():
-            drawing.add(name, mesh)
+        for name, geometry in shapes.items():
+            drawing.add(name, geometry)
         encoder = open_encoder(size, 30)
         times, reads, sizes = [], [], []
         for number in range(pictures):
             positions = model.joints.home + 0.3 * np.sin(number / 15)
             placements = dict(zip(model.link_names, link_placements(model, positions), strict=True))
-            scene, camera = view(meshes, placements, size)
+            scene, camera = view(shapes, placements, size)
             marks = [time.perf_counter()]
             picture = drawing.draw(scene, camera)
             marks.append(time.perf_counter())
@@ -108,7 +108,7 @@ def measure(robot: str, device: int | None, triangles: str, pictures: int) -> di
         )
         name = drawing.renderer_name
         drawing.close()
-    count = sum(len(mesh.triangles) for mesh in meshes.values())
+    count = sum(len(geometry.triangles) for geometry in shapes.values())
     return {
         "robot": robot,
         "triangles": count,
@@ -126,11 +126,11 @@ def read_back_ms(drawing: Drawing) -> float:
         return (time.perf_counter() - began) * 1e3
 
 
-def view(meshes, placements, size):
+def view(shapes, placements, size):
     points = np.array([[x, y, z] for x in (-0.4, 0.4) for y in (-0.4, 0.4) for z in (0.0, 1.0)])
     center = np.array([0.0, 0.0, 0.45])
     camera = Camera(center + np.array([1.5, -1.5, 0.85]), center, np.array([0.0, 0.0, 1.0]))
-    parts = tuple(Part(name, placements[name]) for name in meshes)
+    parts = tuple(Part(name, placements[name]) for name in shapes)
     return Scene(parts, center, 0.9), fitted(camera, size[0] / size[1], points)
 
 

@@ -57,22 +57,22 @@ def pictures() -> Iterator[bytes]:
     from renderer.drawing.drawing import Drawing
     from renderer.drawing.opengl import open_context
     from renderer.encoding.encoder import open_encoder
-    from renderer.shapes.prepare import prepared as prepared_mesh
+    from renderer.shapes.prepare import prepared as prepared_shape
     from robots.descriptions.description import load
-    from robots.descriptions.glb import link_meshes
+    from robots.descriptions.glb import link_glbs
     from robots.kinematics.model import build_model, link_placements
 
     size = (1280, 720)
     description = load("pt600")
     model = build_model(description)
     drawing, encoder = Drawing(open_context(None), size, samples=0), open_encoder(size, 30)
-    meshes = {name: prepared_mesh(glb) for name, glb in link_meshes(description).items()}
-    for name, mesh in meshes.items():
+    shapes = {name: prepared_shape(glb) for name, glb in link_glbs(description).items()}
+    for name, mesh in shapes.items():
         drawing.add(name, mesh)
     for number in range(PICTURES):
         positions = model.joints.home + 0.3 * np.sin(number / 15)
         placements = dict(zip(model.link_names, link_placements(model, positions), strict=True))
-        scene, camera = view(meshes, placements, size)
+        scene, camera = view(shapes, placements, size)
         packet = encoder.encode(drawing.draw(scene, camera), key_frame=number == 0)
         yield CompressedVideo(frame_id="bench", data=packet.data, format="h264").SerializeToString()
     drawing.close()

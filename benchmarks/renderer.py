@@ -41,9 +41,9 @@ from renderer.drawing.drawing import Drawing
 from renderer.drawing.opengl import open_context
 from renderer.scene.cameras import Camera
 from renderer.scene.scene import Part, Scene
-from renderer.shapes.prepare import MOST_TRIANGLES, Mesh, prepared_surfaces
+from renderer.shapes.prepare import MOST_TRIANGLES, BufferGeometry, prepared_surfaces
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_meshes
+from robots.descriptions.glb import link_glbs
 from robots.kinematics.model import build_model, link_placements
 from robots.shapes.files.gltf import Surface, read_glb
 
@@ -170,7 +170,7 @@ def write_scene(path: Path) -> dict[str, int]:
     """Write the arm's meshes with few and with many triangles, its motion, the cameras."""
     description = load(ROBOT)
     model = build_model(description)
-    glbs = link_meshes(description)
+    glbs = link_glbs(description)
     arrays: dict[str, Any] = {
         "links": len(glbs),
         "eyes": EYES,
@@ -179,14 +179,14 @@ def write_scene(path: Path) -> dict[str, int]:
     }
     totals = {}
     for count in ("20k", "100k"):
-        meshes = [mesh_of(glb, count, whole=True) for glb in glbs.values()]
-        totals[count] = sum(len(mesh.finest) for mesh in meshes)
-        for number, mesh in enumerate(meshes):
-            used = mesh.finest.max() + 1  # those of other levels of detail follow
-            arrays[f"{count}/{number}/positions"] = mesh.positions[:used]
-            arrays[f"{count}/{number}/normals"] = mesh.normals[:used]
-            arrays[f"{count}/{number}/triangles"] = mesh.finest
-            arrays[f"{count}/{number}/color"] = mesh.colors[:, :3].mean(axis=0) / 255.0
+        shapes = [geometry_of(glb, count, whole=True) for glb in glbs.values()]
+        totals[count] = sum(len(geometry.finest) for geometry in shapes)
+        for number, geometry in enumerate(shapes):
+            used = geometry.finest.max() + 1  # those of other levels of detail follow
+            arrays[f"{count}/{number}/positions"] = geometry.positions[:used]
+            arrays[f"{count}/{number}/normals"] = geometry.normals[:used]
+            arrays[f"{count}/{number}/triangles"] = geometry.finest
+            arrays[f"{count}/{number}/color"] = geometry.colors[:, :3].mean(axis=0) / 255.0
     arrays["placements"] = np.array(
         [
             [
@@ -206,16 +206,16 @@ def write_scene(path: Path) -> dict[str, int]:
 
 
 @cache
-def mesh_of(glb: bytes, count: str, *, whole: bool = False, exact: bool = False) -> Mesh:
+def geometry_of(glb: bytes, count: str, *, whole: bool = False, exact: bool = False) -> BufferGeometry:
     """Return a mesh as the service draws it, or with every triangle, also with light at each pixel."""
     surfaces = read_glb(glb)
     if count == "100k":
         surfaces = tuple(map(subdivided, surfaces))
-    mesh = prepared_surfaces(surfaces, most_triangles=10**9 if whole else MOST_TRIANGLES)
+    geometry = prepared_surfaces(surfaces, most_triangles=10**9 if whole else MOST_TRIANGLES)
     if not whole:
-        return mesh
-    vertex_lit = mesh.vertex_lit[:1] * (0 if exact else 1)
-    return replace(mesh, levels=mesh.levels[:2], errors=mesh.errors[:1], vertex_lit=vertex_lit)
+        return geometry
+    vertex_lit = geometry.vertex_lit[:1] * (0 if exact else 1)
+    return replace(geometry, levels=geometry.levels[:2], errors=geometry.errors[:1], vertex_lit=vertex_lit)
 
 
 def subdivided(surface: Surface) -> Surface:
@@ -245,7 +245,7 @@ def subdivided(surface: Surface) -> Surface:
 def serve_ours(path: Path, device: int | None) -> None:
     """Answer rows as the peers do, and compare pictures."""
     scene = dict(np.load(path))
-    glbs = link_meshes(load(ROBOT))
+    glbs = link_glbs(load(ROBOT))
     print(json.dumps({"ready": "robomesh"}), flush=True)
 
     def make(row: dict[str, Any]) -> Any:
@@ -253,7 +253,7 @@ def serve_ours(path: Path, device: int | None) -> None:
         shading = "full" if row["variant"] == "full" else "fast"
         drawing = Drawing(open_context(device), tuple(row["size"]), samples=row["samples"], shading=shading)
         for name, glb in glbs.items():
-            drawing.add(name, mesh_of(glb, row["count"], whole=whole, exact=exact))
+            drawing.add(name, geometry_of(glb, row["count"], whole=whole, exact=exact))
         cameras = [
             Camera(eye, TARGET, np.array([0.0, 0.0, 1.0]), field_of_view=FIELD_OF_VIEW) for eye in EYES
         ]

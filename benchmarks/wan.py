@@ -58,7 +58,7 @@ VIDEO_MBIT = 8.0
 QUEUE_BYTES = 64_000
 NARROW_MBIT = 2
 MESH = f"{ROBOT}/mesh/base"
-MESH_BYTES = 3_000_000
+SHAPE_BYTES = 3_000_000
 START_S = 120.0
 
 
@@ -190,7 +190,7 @@ def narrow(seconds: float, meshes: int) -> dict[str, Any]:
                 pour_video(made)
                 rows[f"{NARROW_MBIT} Mbit/s, told"] = beside_video(made, NARROW_MBIT, seconds)
             made.far.change(rate_bps=NARROW_MBIT * 1e6, queue_bytes=QUEUE_BYTES)
-            rows["meshes beside video" if video else "meshes alone"] = fetch_meshes(made, meshes)
+            rows["meshes beside video" if video else "meshes alone"] = fetch_shapes(made, meshes)
     with stage(told_mbit=NARROW_MBIT, moving=True, delay_ms=ONE_WAY_MS) as made:
         view = drawn_view(made)
         for mbit in (100, NARROW_MBIT):
@@ -238,9 +238,9 @@ def beside_video(made: Stage, mbit: float, seconds: float, video: str = VIDEO) -
     }
 
 
-def fetch_meshes(made: Stage, times: int) -> dict[str, Any]:
+def fetch_shapes(made: Stage, times: int) -> dict[str, Any]:
     """Return how many meshes arrived complete, the time for each, and the joints during the transfer."""
-    sha256 = made.beside.do("hold_mesh", "plant", "arm", MESH_BYTES)
+    sha256 = made.beside.do("hold_mesh", "plant", "arm", SHAPE_BYTES)
     made.room.do("samples", JOINTS)
     answers = [made.room.do("mesh", MESH, 10.0) for _ in range(times)]
     lags = [lag for _, lag, live, *_ in made.room.do("samples", JOINTS) if live]

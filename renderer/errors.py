@@ -3,7 +3,7 @@
 RendererError
 ├── NoOpenGLError           OpenGL cannot be used: the text names what to install
 ├── NoEncoderError          no H.264 encoder could be opened, or one failed
-├── GlbError                a mesh is not valid GLB
+├── GlbError                a shape is not valid GLB
 ├── ChainError              a URDF is not a tree of joints
 ├── Mp4Error                packets cannot be put into an MP4 file
 └── ViewError               a view that cannot be drawn, with the reason
@@ -45,7 +45,7 @@ class NoEncoderError(RendererError):
 
 
 class GlbError(RendererError):
-    """A mesh is not GLB, or of an unsupported kind."""
+    """A shape is not GLB, or of an unsupported kind."""
 
 
 class ChainError(RendererError):

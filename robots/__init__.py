@@ -1,1 +1,1 @@
-"""Robot descriptions, D-H rows, meshes, kinematics, collision checks, URDF and GLB."""
+"""Robot descriptions, D-H rows, shapes, kinematics, collision checks, URDF and GLB."""

@@ -21,7 +21,7 @@ from robomesh.recordings.writing.capture import Capture
 from robomesh.recordings.writing.reindex import index
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_meshes
+from robots.descriptions.glb import link_glbs
 from robots.descriptions.urdf.write import to_urdf
 from services.kinematics.descriptions import describe
 
@@ -114,9 +114,9 @@ def write_recording(
 def write_swinging_arm(path: Path) -> Path:
     """Write a Pt600 that swings its waist for 2 s, as its gateway and kinematics would publish it."""
     description = load("pt600")
-    glbs = link_meshes(description)
+    glbs = link_glbs(description)
     message = describe(
-        description, urdf=to_urdf(description), meshes=glbs, base_to_site=np.eye(4), cell="", simulated=True
+        description, urdf=to_urdf(description), shapes=glbs, base_to_site=np.eye(4), cell="", simulated=True
     )
     with Written(path) as file:
         file.put("description", message, 0.0)

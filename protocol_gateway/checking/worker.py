@@ -22,7 +22,7 @@ from robomesh.files.worker import answer_all
 from robomesh.reasons import Reason
 from robots.checks.check import check_plan, check_program
 from robots.checks.jog import next_part
-from robots.collision import Cell, build_cell, missing_meshes, pending, unshaped, unshaped_moving
+from robots.collision import Cell, build_cell, missing_shapes, pending, unshaped, unshaped_moving
 from robots.kinematics.inverse import InverseSolver, build_solver
 from robots.kinematics.joints import FloatArray, doubtful_limits
 from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
@@ -116,7 +116,7 @@ def _coverage(cell: Cell, robot: str) -> tuple[list[Reason], list[Reason]]:
     if reason := doubtful_limits(robot, cell.arms[robot].joints):
         uncovered.append(reason)
     for name, arm in cell.arms.items():
-        bare, missing = unshaped(cell, name), missing_meshes(cell, name)
+        bare, missing = unshaped(cell, name), missing_shapes(cell, name)
         moving = unshaped_moving(cell, name)
         if len(bare) == len(arm.model.link_names):
             uncovered.append(codes.NO_SHAPES(name=name))

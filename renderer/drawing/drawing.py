@@ -24,7 +24,7 @@ from renderer.drawing.ribbons import ribbons
 from renderer.drawing.shadow import FloorShadow
 from renderer.scene.cameras import Camera, scales, site_to_clip
 from renderer.scene.scene import Finish, Line, Part, Scene
-from renderer.shapes.prepare import Mesh
+from renderer.shapes.prepare import BufferGeometry
 from renderer.shapes.vertex_light import counts_at
 
 Picture = NDArray[np.uint8]
@@ -72,7 +72,7 @@ class _Body(NamedTuple):
 
 
 class Drawing:
-    """A drawing surface of one size with its meshes; used in the context's thread only.
+    """A drawing surface of one size with its shapes; used in the context's thread only.
 
     Attributes:
         renderer_name: The OpenGL driver's name of the device, and whether it draws in software.
@@ -105,26 +105,26 @@ class Drawing:
         self._ribbon = context.vertex_array(
             programs.ribbon, [(self._ribbon_buffer, "4f 4f", "place", "tone")]
         )
-        self._meshes: dict[str, Uploaded] = {}
+        self._shapes: dict[str, Uploaded] = {}
         self._levels = LevelsOfDetail()
         self._pixels = np.empty((size[1], size[0], 4), dtype=np.uint8)
 
     def has(self, name: str) -> bool:
-        """Return whether the mesh was added."""
-        return name in self._meshes
+        """Return whether the shape was added."""
+        return name in self._shapes
 
-    def add(self, name: str, mesh: Mesh) -> None:
-        """Add a mesh; it replaces one of the same name."""
+    def add(self, name: str, geometry: BufferGeometry) -> None:
+        """Add a shape; it replaces one of the same name."""
         self.forget([name])
         with self.context:
-            self._meshes[name] = upload(self.context, self._programs, mesh)
+            self._shapes[name] = upload(self.context, self._programs, geometry)
         self._shadow.forget()
 
     def forget(self, names: Iterable[str]) -> None:
-        """Release meshes."""
+        """Release shapes."""
         with self.context:
             for name in names:
-                uploaded = self._meshes.pop(name, None)
+                uploaded = self._shapes.pop(name, None)
                 if uploaded is not None:
                     uploaded.release()
 
@@ -150,14 +150,14 @@ class Drawing:
             eye = part.part_to_site[:3, :3].T @ (camera.eye - part.part_to_site[:3, 3])
             box = uploaded.corners
             if part.finish is not Finish.GHOST and (eye >= box[0]).all() and (eye <= box[-1]).all():
-                mesh = uploaded.mesh
-                if contains(mesh.positions.astype(np.float64), mesh.finest, eye):
+                geometry = uploaded.geometry
+                if contains(geometry.positions.astype(np.float64), geometry.finest, eye):
                     return part.name
         return ""
 
     def close(self) -> None:
-        """Release all meshes and the context."""
-        self.forget(list(self._meshes))
+        """Release all shapes and the context."""
+        self.forget(list(self._shapes))
         self.context.release()
 
     def _draw(self, scene: Scene, camera: Camera) -> Picture:
@@ -180,7 +180,7 @@ class Drawing:
             if self._lamp is not None:
                 self._lamp.light(solid, center=center, radius=radius)
             through = {
-                pair[0].mesh
+                pair[0].shape
                 for pair in fixtures
                 if hides(camera, aspect, _corners([pair]), center=scene.center, radius=scene.radius)
             }
@@ -194,7 +194,7 @@ class Drawing:
         return picture
 
     def _known(self, parts: tuple[Part, ...]) -> Bodies:
-        return [(part, self._meshes[part.mesh]) for part in parts if part.mesh in self._meshes]
+        return [(part, self._shapes[part.shape]) for part in parts if part.shape in self._shapes]
 
     def _draw_bodies(
         self,
@@ -234,7 +234,7 @@ class Drawing:
         for body in self._by_distance(bodies, camera):
             if body.part.finish is Finish.GHOST:
                 ghosts.append(body)
-            elif body.uploaded.mesh.transparent or body.part.mesh in through:
+            elif body.uploaded.geometry.transparent or body.part.shape in through:
                 glass.append(body)
             else:
                 solid.append(body)
@@ -248,7 +248,7 @@ class Drawing:
         self._draw_lines(scene.lines, matrix)
         # Transparent bodies last, the farthest first; then the ghost over everything.
         for body in reversed(glass):
-            self._draw_faces(body, opacity=_SEEN_THROUGH if body.part.mesh in through else 1.0)
+            self._draw_faces(body, opacity=_SEEN_THROUGH if body.part.shape in through else 1.0)
             self._draw_edges(body)
         # Only a ghost's nearest faces: draw depth first, then the faces with that depth.
         self._bodies.color_mask = (False,) * 4
@@ -270,7 +270,7 @@ class Drawing:
         scale = scales(camera, self.size[1], distances.min(axis=1))
         levels = self._levels.of(bodies, camera, scale)
         counts = np.array(
-            [uploaded.mesh.vertex_lit[level] for (_, uploaded), level in zip(bodies, levels, strict=True)]
+            [uploaded.geometry.vertex_lit[level] for (_, uploaded), level in zip(bodies, levels, strict=True)]
         )
         if self._lamp is not None:
             counts[:] = 0  # shadows on bodies have edges within triangles

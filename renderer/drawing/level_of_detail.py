@@ -34,7 +34,7 @@ class LevelsOfDetail:
         for number, ((part, uploaded), allowed) in enumerate(
             zip(bodies, (_MOST_PX / scales).tolist(), strict=True)
         ):
-            key = (view, number, part.mesh)
+            key = (view, number, part.shape)
             level = next_level(uploaded.errors, allowed, self._kept.get(key))
             self._kept[key] = level
             found.append(level)

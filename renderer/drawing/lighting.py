@@ -35,7 +35,7 @@ class LampShadow:
     def light(self, parts: Sequence[tuple[Part, Uploaded]], *, center: FloatArray, radius: float) -> None:
         """Give the body program the shadow of these bodies; redraw the map if they have moved."""
         placements = np.array([part.part_to_site for part, _ in parts]).reshape(-1, 4, 4)
-        key = (tuple(part.mesh for part, _ in parts), center.tobytes(), radius)
+        key = (tuple(part.shape for part, _ in parts), center.tobytes(), radius)
         moved = np.abs(placements - self._placements).max(initial=0.0) if key == self._of else np.inf
         if moved >= _NOTICEABLE * radius:
             self._of, self._placements = key, placements

@@ -1,4 +1,4 @@
-"""Off-screen OpenGL contexts, shader programs, and meshes on the GPU."""
+"""Off-screen OpenGL contexts, shader programs, and shapes on the GPU."""
 
 import ctypes
 import logging
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from renderer.drawing import body_shaders, shaders
 from renderer.errors import NoOpenGLError
-from renderer.shapes.prepare import VERTEX, Mesh
+from renderer.shapes.prepare import VERTEX, BufferGeometry
 
 log = logging.getLogger(__name__)
 
@@ -160,16 +160,16 @@ def compile_programs(context: moderngl.Context, *, samples: int, full: bool) -> 
 
 @dataclass(frozen=True, eq=False)
 class Uploaded:
-    """A mesh on the GPU.
+    """A shape on the GPU.
 
     Attributes:
-        mesh: The source.
-        corners: (8, 3) corners of the box around it, in the mesh's frame [m].
+        geometry: The source.
+        corners: (8, 3) corners of the box around it, in the shape's frame [m].
         levels: First triangle and end of each level of detail.
         errors: Of each level [m].
     """
 
-    mesh: Mesh
+    geometry: BufferGeometry
 
     body: moderngl.VertexArray | None
     vertex_lit: moderngl.VertexArray | None
@@ -190,37 +190,39 @@ class Uploaded:
             buffer.release()
 
 
-def upload(context: moderngl.Context, programs: Programs, mesh: Mesh) -> Uploaded:
-    """Upload a mesh to the GPU."""
+def upload(context: moderngl.Context, programs: Programs, geometry: BufferGeometry) -> Uploaded:
+    """Upload a geometry to the GPU."""
     buffers: list[moderngl.Buffer] = []
 
     def buffer(data: bytes) -> moderngl.Buffer:
         buffers.append(context.buffer(data))
         return buffers[-1]
 
-    vertices = np.zeros(len(mesh.positions), dtype=VERTEX)
-    vertices["position"], vertices["normal"] = mesh.positions, mesh.normals
-    vertices["color"], vertices["surface"] = mesh.colors, mesh.surface
+    vertices = np.zeros(len(geometry.positions), dtype=VERTEX)
+    vertices["position"], vertices["normal"] = geometry.positions, geometry.normals
+    vertices["color"], vertices["surface"] = geometry.colors, geometry.surface
     body = vertex_lit = edges = shadow = lamp = None
-    if len(mesh.triangles):
+    if len(geometry.triangles):
         content = buffer(vertices.tobytes())
         layout = (content, "3f 3f 4f1 4f1", "position", "normal", "paint", "surface")
-        indices = buffer(mesh.triangles.astype("u4").tobytes())
+        indices = buffer(geometry.triangles.astype("u4").tobytes())
         body = context.vertex_array(programs.body, [layout], index_buffer=indices)
         vertex_lit = context.vertex_array(programs.vertex_lit, [layout], index_buffer=indices)
         lamp = context.vertex_array(programs.lamp, [(content, "3f 20x", "position")], index_buffer=indices)
-    if len(mesh.edges):
-        ends = buffer(mesh.edges.tobytes())
+    if len(geometry.edges):
+        ends = buffer(geometry.edges.tobytes())
         edges = context.vertex_array(programs.edge, [(ends, "3f", "position")], mode=moderngl.LINES)
-    if len(mesh.shadow):
-        shadow = context.vertex_array(programs.cast, [(buffer(mesh.shadow.tobytes()), "3f", "position")])
-    low, high = (mesh.positions.min(axis=0), mesh.positions.max(axis=0)) if len(vertices) else (0.0, 0.0)
+    if len(geometry.shadow):
+        shadow = context.vertex_array(programs.cast, [(buffer(geometry.shadow.tobytes()), "3f", "position")])
+    low, high = (
+        (geometry.positions.min(axis=0), geometry.positions.max(axis=0)) if len(vertices) else (0.0, 0.0)
+    )
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float64)
     box = low + corners * np.subtract(high, low)
-    starts = mesh.levels.tolist()
+    starts = geometry.levels.tolist()
     levels = tuple(pairwise(starts))
     return Uploaded(
-        mesh, body, vertex_lit, edges, shadow, lamp, box, levels, tuple(mesh.errors.tolist()), buffers
+        geometry, body, vertex_lit, edges, shadow, lamp, box, levels, tuple(geometry.errors.tolist()), buffers
     )
 
 

@@ -68,7 +68,7 @@ class FloorShadow:
             floor: Height of the floor [m].
         """
         placements = np.array([part.part_to_site for part, _ in parts]).reshape(-1, 4, 4)
-        key = (tuple(part.mesh for part, _ in parts), center.tobytes(), radius, floor)
+        key = (tuple(part.shape for part, _ in parts), center.tobytes(), radius, floor)
         if key == self._of and np.abs(placements - self._placements).max(initial=0.0) < _NOTICEABLE * radius:
             return
         self._of, self._placements = key, placements

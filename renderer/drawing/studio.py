@@ -20,7 +20,7 @@ from renderer.drawing.opengl import open_context
 from renderer.scene.cameras import Camera, close_up
 from renderer.scene.scene import Scene
 from renderer.shapes import cache
-from renderer.shapes.prepare import Mesh
+from renderer.shapes.prepare import BufferGeometry
 
 _NICE = 5
 # A surface that is not used for this time is released: 1920 x 1080 takes a hundred megabytes. The next
@@ -50,7 +50,7 @@ class _Open:
 
 
 class Studio:
-    """The drawing surfaces and meshes; every method runs in the drawing thread."""
+    """The drawing surfaces and shapes; every method runs in the drawing thread."""
 
     def __init__(
         self, size: tuple[int, int], *, samples: int, shading: str, device: int | None, folder: Path
@@ -66,24 +66,24 @@ class Studio:
         """
         self._size, self._samples, self._folder = size, samples, folder
         self._shading, self._device = shading, device
-        self._meshes: dict[str, Mesh] = {}
+        self._shapes: dict[str, BufferGeometry] = {}
         self._close_ups: dict[str, Camera] = {}
         self._drawings: dict[tuple[tuple[int, int], int], _Open] = {}
         # Opened here, so that a machine without OpenGL fails at the start.
         self.renderer_name = self._drawing(size, samples).renderer_name
 
-    def add_mesh(self, name: str, glb: bytes, color: str) -> None:
-        """Add a link's mesh, unless it exists already.
+    def add_shape(self, name: str, glb: bytes, color: str) -> None:
+        """Add a link's shape, unless it exists already.
 
         Raises:
             GlbError: If it is not GLB.
         """
-        if name not in self._meshes:
-            self._meshes[name] = cache.prepared_once(glb, color=color, folder=self._folder)
+        if name not in self._shapes:
+            self._shapes[name] = cache.prepared_once(glb, color=color, folder=self._folder)
 
-    def has_mesh(self, name: str) -> bool:
-        """Return whether a link's mesh has been added."""
-        return name in self._meshes
+    def has_shape(self, name: str) -> bool:
+        """Return whether a link's shape has been added."""
+        return name in self._shapes
 
     def draw(
         self,
@@ -102,18 +102,18 @@ class Studio:
         """
         drawing = self._drawing(size, 0 if coarse else self._samples)
         for part in (*scene.parts, *scene.others, *scene.fixtures):
-            if not drawing.has(part.mesh) and part.mesh in self._meshes:
-                drawing.add(part.mesh, self._meshes[part.mesh])
+            if not drawing.has(part.shape) and part.shape in self._shapes:
+                drawing.add(part.shape, self._shapes[part.shape])
         if close_up_of is not None:
             camera = self._close_up(drawing, close_up_of, scene, camera)
         picture = drawing.draw(scene, camera)
         return Drawn(picture=picture, camera=camera, inside=drawing.inside(scene, camera))
 
-    def tidy(self, *, meshes: Collection[str], streams: Collection[str]) -> None:
-        """Release unused surfaces, meshes and cameras.
+    def tidy(self, *, shapes: Collection[str], streams: Collection[str]) -> None:
+        """Release unused surfaces, shapes and cameras.
 
         Args:
-            meshes: Names of the meshes that robots have.
+            shapes: Names of the shapes that robots have.
             streams: Names of the existing streams.
         """
         now = time.monotonic()
@@ -121,9 +121,9 @@ class Studio:
             if key[0] != self._size and now - opened.used > _UNUSED_S:
                 del self._drawings[key]
                 opened.drawing.close()
-        gone = self._meshes.keys() - set(meshes)
+        gone = self._shapes.keys() - set(shapes)
         for name in gone:
-            del self._meshes[name]
+            del self._shapes[name]
         for opened in self._drawings.values():
             opened.drawing.forget(gone)
         for stream in self._close_ups.keys() - set(streams):

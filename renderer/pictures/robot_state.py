@@ -36,7 +36,7 @@ class RobotState:
     """The latest message of each topic of one robot.
 
     Attributes:
-        appearance: None until the description and the meshes were received.
+        appearance: None until the description and the shapes were received.
         link_placements: (4, 4) link to site by link; empty until frames were received.
         positions: By joint [rad] or [m]; empty until joint states were received.
         clearance_line: Line to the nearest body; None if there is none, or no clearance is published.

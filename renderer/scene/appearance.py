@@ -1,4 +1,4 @@
-"""A robot's appearance from its description: links, meshes, fixtures, workspace."""
+"""A robot's appearance from its description: links, shapes, fixtures, workspace."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Appearance:
 
     Attributes:
         description: Its published description.
-        meshes: Name of each link's mesh in the drawing.
+        shapes: Name of each link's shape in the drawing.
         fixtures: Fixtures of its cell.
         base_to_site: (4, 4).
         workspace: (n, 3) points around everything that it can reach, in its base frame [m].
@@ -36,7 +36,7 @@ class Appearance:
 
     description: Description
     chain: Chain
-    meshes: Mapping[str, str]
+    shapes: Mapping[str, str]
     fixtures: tuple[Part, ...]
     base_to_site: FloatArray
     workspace: FloatArray
@@ -71,10 +71,10 @@ def appearance_of(description: Description) -> Appearance:
     return Appearance(
         description=description,
         chain=chain,
-        meshes={link.name: mesh_name(link) for link in description.links if link.mesh},
+        shapes={link.name: shape_name(link) for link in description.links if link.mesh},
         fixtures=tuple(
             Part(
-                mesh_name(fixture),
+                shape_name(fixture),
                 np.array(fixture.fixture_to_site).reshape(4, 4),
                 name=fixture.name,
             )
@@ -96,8 +96,8 @@ def floor_of(description: Description) -> float | None:
     return description.floor.height if description.floor.HasField("height") else None
 
 
-def mesh_name(body: Description.Link | Description.Fixture) -> str:
-    """Return the name of a mesh in the drawing, by content, so that robots of one model share it."""
+def shape_name(body: Description.Link | Description.Fixture) -> str:
+    """Return the name of a shape in the drawing, by content, so that robots of one model share it."""
     return f"{body.mesh_sha256} {body.color}"
 
 

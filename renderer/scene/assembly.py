@@ -95,8 +95,8 @@ def _bodies(
     appearance: Appearance, placed: Mapping[str, FloatArray], finish: Callable[[str], Finish]
 ) -> list[Part]:
     return [
-        Part(mesh, placed[link], finish(link), link)
-        for link, mesh in appearance.meshes.items()
+        Part(shape, placed[link], finish(link), link)
+        for link, shape in appearance.shapes.items()
         if link in placed
     ]
 

@@ -23,12 +23,12 @@ class Part:
     """A body of the scene.
 
     Attributes:
-        mesh: Name of its mesh in the drawing.
+        shape: Name of its triangles in the drawing.
         part_to_site: (4, 4).
         name: Name of the link or fixture.
     """
 
-    mesh: str
+    shape: str
     part_to_site: FloatArray
     finish: Finish = Finish.PLAIN
     name: str = ""

@@ -59,7 +59,7 @@ class Settings:
         device: Number of the EGL device; None: the first GPU that works, or software.
         most_views: Largest number of requested views, for all robots together.
         quotas: Quotas of each operator.
-        folder: Cache folder of the meshes.
+        folder: Cache folder of the shapes.
     """
 
     site: str
@@ -165,11 +165,11 @@ class _Renderer:
 
     # ---------------------------------------------------------------- robots
 
-    async def has_mesh(self, name: str) -> bool:
-        return self._studio.has_mesh(name)
+    async def has_shape(self, name: str) -> bool:
+        return self._studio.has_shape(name)
 
-    async def add_mesh(self, name: str, glb: bytes, color: str) -> None:
-        await _in(self._drawing, self._studio.add_mesh, name, glb, color)
+    async def add_shape(self, name: str, glb: bytes, color: str) -> None:
+        await _in(self._drawing, self._studio.add_shape, name, glb, color)
 
     @property
     def shown(self) -> frozenset[str]:
@@ -390,6 +390,6 @@ class _Renderer:
             await _in(
                 self._drawing,
                 self._studio.tidy,
-                meshes=self._robots.meshes,
+                shapes=self._robots.shapes,
                 streams={stream.name for stream in self._streams.values()},
             )

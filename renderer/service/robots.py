@@ -1,4 +1,4 @@
-"""The robots known to the renderer: their topics, their meshes, and when they are removed."""
+"""The robots known to the renderer: their topics, their shapes, and when they are removed."""
 
 import asyncio
 import logging
@@ -14,7 +14,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from renderer.errors import RendererError
 from renderer.pictures.robot_state import Ages, RobotState
-from renderer.scene.appearance import appearance_of, mesh_name
+from renderer.scene.appearance import appearance_of, shape_name
 from renderer.shapes.cache import store_glb, stored_glb
 from robomesh.contract.keys import ROOT, is_replay, robot_key
 from robomesh.errors import MessageError, RobomeshError
@@ -24,7 +24,7 @@ from robomesh.wire.session import Session
 
 log = logging.getLogger(__name__)
 
-_MESH_TIMEOUT_S = 10.0
+_SHAPE_TIMEOUT_S = 10.0
 _ASK_AGAIN_S = 2.0
 # Queue length for a site with many robots. Only each robot's newest sample is used.
 _RING = 512
@@ -46,17 +46,17 @@ _FORGET_AFTER_S, _FORGET_REPLAY_AFTER_S = 15.0, 1.0
 
 
 class RobotObserver(Protocol):
-    """The receiver of meshes and of changes of robots."""
+    """The receiver of shapes and of changes of robots."""
 
     @property
     def shown(self) -> Collection[str]:
         """Names of the robots in watched pictures."""
 
-    async def has_mesh(self, name: str) -> bool:
-        """Return whether a mesh has been added."""
+    async def has_shape(self, name: str) -> bool:
+        """Return whether a shape has been added."""
 
-    async def add_mesh(self, name: str, glb: bytes, color: str) -> None:
-        """Add a mesh."""
+    async def add_shape(self, name: str, glb: bytes, color: str) -> None:
+        """Add a shape."""
 
     def on_ready(self, state: RobotState) -> None:
         """React to a robot that can be drawn, or to its new description."""
@@ -94,7 +94,7 @@ class Robots:
         # By key: when a live sample was taken, and the newest one that was not.
         self._taken_at: dict[str, float] = {}
         self._waiting: dict[str, Sample] = {}
-        self._meshes: dict[str, set[str]] = {}
+        self._shapes: dict[str, set[str]] = {}
         self._loading: dict[str, asyncio.Task[None]] = {}
         self._providers: defaultdict[str, set[tuple[str, str]]] = defaultdict(set)
         self._forgetting: dict[str, asyncio.TimerHandle] = {}
@@ -125,9 +125,9 @@ class Robots:
         return [other for other in self.states.values() if other is not state and other.cell == cell]
 
     @property
-    def meshes(self) -> set[str]:
-        """Names of the meshes of all robots."""
-        return set().union(*self._meshes.values())
+    def shapes(self) -> set[str]:
+        """Names of the shapes of all robots."""
+        return set().union(*self._shapes.values())
 
     async def catch_up(self, state: RobotState) -> None:
         """Take the newest samples of a robot and its cell that were not decoded; end a rest."""
@@ -233,38 +233,38 @@ class Robots:
                 self._describe(state, description)
 
     async def _load(self, state: RobotState, description: Description) -> None:
-        """Load a robot's meshes and make it ready to draw."""
+        """Load a robot's shapes and make it ready to draw."""
         where = f"{state.site}/{state.name}"
         try:
             appearance = await asyncio.to_thread(appearance_of, description)
             links: list[Description.Link | Description.Fixture] = [*description.links, *description.fixtures]
             bodies = [body for body in links if body.mesh]
-            # The old meshes are drawn until the new ones are loaded.
-            names = {mesh_name(body) for body in bodies}
-            self._meshes[state.name] = self._meshes.get(state.name, set()) | names
+            # The old shapes are drawn until the new ones are loaded.
+            names = {shape_name(body) for body in bodies}
+            self._shapes[state.name] = self._shapes.get(state.name, set()) | names
             for body in bodies:
-                await self._load_mesh(state, body)
+                await self._load_shape(state, body)
         except RendererError as error:
             log.error("%s cannot be drawn: %s", where, error)
             return
         except Exception:
             log.exception("%s cannot be drawn", where)
             return
-        self._meshes[state.name] = names
+        self._shapes[state.name] = names
         state.appearance = appearance
         state.version += 1
         self._observer.on_ready(state)
 
-    async def _load_mesh(self, state: RobotState, body: Description.Link | Description.Fixture) -> None:
-        name = mesh_name(body)
-        if await self._observer.has_mesh(name):
+    async def _load_shape(self, state: RobotState, body: Description.Link | Description.Fixture) -> None:
+        name = shape_name(body)
+        if await self._observer.has_shape(name):
             return
         glb = await asyncio.to_thread(stored_glb, body.mesh_sha256, self._folder)
         key = robot_key(state.site, state.name, f"mesh/{body.mesh}")
         warned = False
         while glb is None:
             try:
-                glb = await self._session.ask_bytes(key, timeout_s=_MESH_TIMEOUT_S)
+                glb = await self._session.ask_bytes(key, timeout_s=_SHAPE_TIMEOUT_S)
             except RobomeshError as error:
                 if not warned:
                     log.warning("mesh of %s: %s; requests are repeated", body.name, error)
@@ -273,7 +273,7 @@ class Robots:
                 continue
             await asyncio.to_thread(store_glb, glb, self._folder)
         try:
-            await self._observer.add_mesh(name, glb, body.color)
+            await self._observer.add_shape(name, glb, body.color)
         except RendererError as error:
             log.error("%s of %s/%s is not drawn: %s", body.name, state.site, state.name, error)
 
@@ -299,7 +299,7 @@ class Robots:
         loading = self._loading.pop(robot, None)
         if loading is not None:
             loading.cancel()
-        self._meshes.pop(robot, None)
+        self._shapes.pop(robot, None)
         for name in _LIVE:
             key = robot_key(self._site, robot, name)
             self._waiting.pop(key, None)

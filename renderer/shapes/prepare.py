@@ -1,4 +1,4 @@
-"""Preparation of a link's mesh for drawing: fewer triangles, smooth curved surfaces, sharp edges."""
+"""Preparation of a link's shape for drawing: fewer triangles, smooth curved surfaces, sharp edges."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,12 +12,12 @@ from renderer.shapes.creases import FloatArray, IntArray, crease_normals, sharp_
 from renderer.shapes.occlusion import open_sky
 from renderer.shapes.simplification import simplified
 from renderer.shapes.vertex_light import SCALES, ordered
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.gltf import TRIANGLES, Surface, read_glb
 
 # Of the finest level: more take memory and time to prepare, and are seen only from very near.
 MOST_TRIANGLES = 16_000
-# Meshes with more, such as scans, are first reduced to as many without a bound of the error: a simplification
+# Shapes with more, such as scans, are first reduced to as many without a bound of the error: a simplification
 # with a bound of 400,000 rough triangles takes 15 s.
 _MOST_BOUNDED = 64_000
 # Of a rough scan each side is sharp: the longest remain.
@@ -38,8 +38,8 @@ VERTEX = np.dtype([("position", "f4", 3), ("normal", "f4", 3), ("color", "u1", 4
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
-    """Triangles in the link's frame [m].
+class BufferGeometry:
+    """Triangles in the link's frame [m], as arrays for the GPU (as three.js' BufferGeometry).
 
     Attributes:
         positions: (v, 3) float32.
@@ -78,12 +78,12 @@ class Mesh:
         return bool((self.colors[:, 3] < 255).any())
 
 
-def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLES) -> Mesh:
-    """Return a mesh prepared from GLB.
+def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLES) -> BufferGeometry:
+    """Return a shape prepared from GLB.
 
     Args:
         color: "#rrggbb" for surfaces without a colour in the file.
-        most_triangles: A mesh with more triangles is simplified to at most this number, if an error of
+        most_triangles: A shape with more triangles is simplified to at most this number, if an error of
             16 mm is enough for it.
 
     Raises:
@@ -91,15 +91,15 @@ def prepared(glb: bytes, *, color: str = "", most_triangles: int = MOST_TRIANGLE
     """
     try:
         surfaces = read_glb(glb)
-    except MeshError as error:
+    except ShapeError as error:
         raise GlbError(str(error)) from None
     return prepared_surfaces(surfaces, color=color, most_triangles=most_triangles)
 
 
 def prepared_surfaces(
     given: Sequence[Surface], *, color: str = "", most_triangles: int = MOST_TRIANGLES
-) -> Mesh:
-    """Return a mesh prepared from the surfaces of a GLB file; arguments as for `prepared`."""
+) -> BufferGeometry:
+    """Return a shape prepared from the surfaces of a GLB file; arguments as for `prepared`."""
     surfaces = [surface for surface in given if surface.mode == TRIANGLES and len(surface.indices)]
     plain = srgb(color) if color else _PLAIN_COLOR
     kept = _MOST_BOUNDED / max(sum(len(surface.indices) for surface in surfaces), 1)
@@ -113,7 +113,7 @@ def prepared_surfaces(
     levels = [_level(*each) for each in _levels(bodies, error)]
     first_vertex = np.cumsum([0, *(len(level.vertices) for level in levels)])
     joined = np.concatenate([level.vertices for level in levels])
-    return Mesh(
+    return BufferGeometry(
         positions=joined["position"],
         normals=joined["normal"],
         colors=joined["color"],
@@ -204,7 +204,7 @@ class _Body:
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """A level of detail: distinct vertices, the triangles between them, `Mesh.vertex_lit`."""
+    """A level of detail: distinct vertices, the triangles between them, `BufferGeometry.vertex_lit`."""
 
     error: float
     vertices: NDArray[np.void]

@@ -1,4 +1,4 @@
-"""Simplification of a mesh within an error in metres; what remains keeps the original's values at corners."""
+"""Simplification within an error in metres; what remains keeps the original's values at corners."""
 
 import fast_simplification
 import numpy as np

@@ -2,7 +2,7 @@
 
 A triangle's colours differ little between both ways if its normals turn little in comparison to the size of
 a highlight, or if it is a few pixels wide. So each triangle has a largest scale up to which its vertices are
-enough, and a mesh begins with the triangles of the largest scales.
+enough, and a shape begins with the triangles of the largest scales.
 """
 
 import numpy as np
@@ -41,11 +41,11 @@ def ordered(
 
 
 def counts_at(scales: FloatArray, counts: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Return how many of their first triangles n meshes light at vertices, at n scales [px/m].
+    """Return how many of their first triangles n shapes light at vertices, at n scales [px/m].
 
     Args:
         scales: (n,).
-        counts: (n, s) of each mesh, from `ordered`.
+        counts: (n, s) of each shape, from `ordered`.
     """
     steps = np.searchsorted(-SCALES, -scales, side="right") - 1  # the smallest that is not smaller
     found: NDArray[np.uint32] = np.where(steps < 0, 0, counts[np.arange(len(scales)), steps])

@@ -1,6 +1,6 @@
-"""Coal's geometry of shapes: one convex hull per link, one per piece of a fixture, or exact meshes.
+"""Coal's geometry of shapes: one convex hull per link, one per piece of a fixture, or exact triangles.
 
-A hull misses no collision of its mesh, and the distance of two hulls takes 1 % of the time of two meshes.
+A hull misses no collision of its shape, and the distance of two hulls takes 1 % of the time of two surfaces.
 """
 
 import contextlib
@@ -11,10 +11,10 @@ from typing import Any
 import coal
 import numpy as np
 
-from robots.descriptions.glb import link_mesh
+from robots.descriptions.glb import link_geometry
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import Shape
-from robots.shapes.mesh import IndexArray, Mesh
+from robots.shapes.geometry import Geometry, IndexArray
 
 # Bodies within this distance touch: coal may return so much for bodies that overlap by millimetres.
 TOUCH_M = 1e-5
@@ -30,7 +30,7 @@ _MOST_BALLS = 6
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A hull or a mesh, in the frame of its link or fixture [m].
+    """A hull or triangles, in the frame of its link or fixture [m].
 
     Attributes:
         geometry: Coal's geometry.
@@ -38,7 +38,7 @@ class Body:
         balls: (k, 3) centres of balls that cover the box.
         radius: The radius of each ball.
         corners: (n, 3) of the hull.
-        hull: Coal's hull of a mesh, for fast lower bounds of its distances; None if there is none or the
+        hull: Coal's hull of triangles, for fast lower bounds of its distances; None if there is none or the
             geometry is a hull.
     """
 
@@ -55,9 +55,9 @@ def hull_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
     """Return one hull of all shapes; empty if they have no vertices.
 
     Raises:
-        MeshError: If a mesh file cannot be read.
+        ShapeError: If a shape file cannot be read.
     """
-    vertices, _ = _solid(link_mesh(shapes))
+    vertices, _ = _solid(link_geometry(shapes))
     return (hull_body(vertices),) if len(vertices) else ()
 
 
@@ -65,9 +65,9 @@ def piece_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
     """Return one hull for each connected piece of the shapes.
 
     Raises:
-        MeshError: If a mesh file cannot be read.
+        ShapeError: If a shape file cannot be read.
     """
-    vertices, triangles = _solid(link_mesh(shapes))
+    vertices, triangles = _solid(link_geometry(shapes))
     return tuple(hull_body(piece) for piece in _pieces(vertices, triangles))
 
 
@@ -75,7 +75,7 @@ def exact_bodies(shapes: Sequence[Shape]) -> tuple[Body, ...]:
     """Return the triangles as one body: a surface, so a body completely inside it does not touch it.
 
     Raises:
-        MeshError: If a mesh file cannot be read.
+        ShapeError: If a shape file cannot be read.
     """
     triangles = surface(shapes)
     return (exact_body(triangles),) if len(triangles) else hull_bodies(shapes)
@@ -96,9 +96,9 @@ def surface(shapes: Sequence[Shape]) -> FloatArray:
     """Return the triangles of shapes by their corners: (n, 3, 3) [m].
 
     Raises:
-        MeshError: If a mesh file cannot be read.
+        ShapeError: If a shape file cannot be read.
     """
-    vertices, triangles = _solid(link_mesh(shapes))
+    vertices, triangles = _solid(link_geometry(shapes))
     return vertices[triangles]
 
 
@@ -166,9 +166,9 @@ def _body(geometry: Any, points: FloatArray) -> Body:
     return Body(geometry, center, half, balls, float(np.linalg.norm(part)), points)
 
 
-def _solid(mesh: Mesh) -> tuple[FloatArray, IndexArray]:
+def _solid(geometry: Geometry) -> tuple[FloatArray, IndexArray]:
     """Join all parts: return vertices, and triangles that share equal vertices."""
-    parts = [part for part in mesh.parts if len(part.vertices)]
+    parts = [part for part in geometry.parts if len(part.vertices)]
     if not parts:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])

@@ -42,7 +42,7 @@ class PairPlan:
     """The self-collision check of an arm.
 
     Attributes:
-        bodies: Hulls, each with the number of its link; the box of a hull contains the link's visual mesh
+        bodies: Hulls, each with the number of its link; the box of a hull contains the link's visual shape
             too if that is checked.
         pairs: Numbers of two bodies, and the bodies to check for them.
         verdicts: One for every two links with a shape.
@@ -94,7 +94,7 @@ def plan_pairs(model: Model, confined: bool, *, wait: bool) -> PairPlan:
         wait: Wait for the study. Otherwise it continues in its process, and the plan is pending.
 
     Raises:
-        MeshError: If a mesh cannot be read.
+        ShapeError: If a shape cannot be read.
     """
     return _with_study(_prepare_model(model, confined), wait=wait)
 
@@ -103,7 +103,7 @@ def plan_of(description: RobotDescription) -> PairPlan:
     """Plan an arm's self-collision check, and wait for the study.
 
     Raises:
-        MeshError: If a mesh cannot be read.
+        ShapeError: If a shape cannot be read.
     """
     return _with_study(_prepare(description), wait=True)
 
@@ -207,7 +207,7 @@ def _case(
     return Case(
         tuple((used.index(one), used.index(other)) for (one, other), _ in pairs),
         tuple(surface(links[number].checked) for number in used),
-        # Only pairs that touch at home may be checked as visual meshes.
+        # Only pairs that touch at home may be checked as visual surfaces.
         tuple(surface(links[number].shapes if number in at_home else ()) for number in used),
         np.stack([link_placements(model, each)[frames] for each in positions]),
         tuple(np.array([] if samples[0] == 0 else samples, np.int64) + first for _, samples in pairs),
@@ -241,9 +241,9 @@ def _refine(start: _Preparation, found: tuple[Found, ...]) -> PairPlan:
             continue
         if kind in EXACT:
             first, second = studied_pairs[number]
-            measured = exact(first, kind is Kind.VISUAL_MESHES), exact(second, kind is Kind.VISUAL_MESHES)
-            if kind is Kind.VISUAL_MESHES:
-                for body, mesh in zip((one, other), measured, strict=True):
-                    bodies[body] = bodies[body][0], enlarged(bodies[body][1], mesh.corners)
+            measured = exact(first, kind is Kind.VISUAL_SURFACES), exact(second, kind is Kind.VISUAL_SURFACES)
+            if kind is Kind.VISUAL_SURFACES:
+                for body, geometry in zip((one, other), measured, strict=True):
+                    bodies[body] = bodies[body][0], enlarged(bodies[body][1], geometry.corners)
         pairs.append((one, other, measured))
     return PairPlan(tuple(bodies), tuple(pairs), tuple(verdicts))

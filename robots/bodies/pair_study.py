@@ -1,10 +1,10 @@
-"""Study of link pairs with hulls that touch at home or often: which to ignore, which to check as meshes.
+"""Study of link pairs with hulls that touch at home or often: which to ignore, which to check as surfaces.
 
     python -m robots.bodies.pair_study RESULT.json < CASE.npz      in a separate process, with limits
 
-A pair is ignored if its exact meshes touch in all sampled positions. A pair is checked as meshes if only its
-hulls touch at home, or if it is apart there and only its hulls touch in at least 1 % of positions. Results
-are in the user's cache, keyed by the case's content; failures are not.
+A pair is ignored if its exact surfaces touch in all sampled positions. A pair is checked as surfaces if only
+its hulls touch at home, or if it is apart there and only its hulls touch in at least 1 % of positions.
+Results are in the user's cache, keyed by the case's content; failures are not.
 """
 
 import fcntl
@@ -32,7 +32,7 @@ from robots.bodies.surfaces import Surface, Touch
 from robots.bodies.verdicts import Kind
 from robots.descriptions.glb import cache_folder
 from robots.kinematics.joints import FloatArray
-from robots.shapes.mesh import IndexArray
+from robots.shapes.geometry import IndexArray
 
 log = logging.getLogger(__name__)
 
@@ -44,7 +44,7 @@ MEMORY_LIMIT = 4 << 30
 SURVEYED, FEWEST_FALSE = 400, 4
 # After this share of the time limit, pairs that are apart at home stay hulls, so that the study can finish.
 _SURVEY_ENDS = 0.75
-# Largest sum of the triangles of two meshes; more would make each check too slow.
+# Largest sum of the triangles of two surfaces; more would make each check too slow.
 MOST_TRIANGLES = 50_000
 # Delay before a failed study is repeated; doubled after each failure, up to the maximum.
 _RETRY_S, _LONGEST_RETRY_S = 30.0, 3600.0
@@ -191,7 +191,7 @@ def _touching_at_home(places: FloatArray, levels: Sequence[tuple[Surface, Surfac
         return Kind.NO_SURFACE
     if len(places) >= SAMPLES and all(touch(*checked, place) for place in places):
         return Kind.ALWAYS
-    for level, kind in zip(levels, (Kind.COLLISION_MESHES, Kind.VISUAL_MESHES), strict=True):
+    for level, kind in zip(levels, (Kind.COLLISION_SURFACES, Kind.VISUAL_SURFACES), strict=True):
         if all(len(surface.triangles) for surface in level) and not touch(*level, places[0]):
             return kind
     return Kind.TOUCHING
@@ -200,7 +200,7 @@ def _touching_at_home(places: FloatArray, levels: Sequence[tuple[Surface, Surfac
 def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touch) -> Found:
     """Decide how to check a pair that is apart at home.
 
-    Visual meshes do not count: the author of the collision geometry may have enlarged it on purpose.
+    Visual surfaces do not count: the author of the collision geometry may have enlarged it on purpose.
 
     Args:
         places: (k, 4, 4) of the second link in the first's frame where their hulls touch.

@@ -21,9 +21,9 @@ class SelfPairs:
 
     Attributes:
         pairs: Numbers of both bodies among the arm's, in the order of Pinocchio's results.
-        measured: The checked bodies of each pair: hulls or exact meshes.
+        measured: The checked bodies of each pair: hulls or exact surfaces.
         geometry, workspace: Pinocchio's models of the measured bodies.
-        hulls, hulls_workspace: The same with hulls instead of meshes, for the pairs `meshes`.
+        hulls, hulls_workspace: The same with hulls instead of surfaces, for the pairs `exact`.
     """
 
     pairs: tuple[tuple[int, int], ...]
@@ -32,7 +32,7 @@ class SelfPairs:
     workspace: Any
     hulls: Any
     hulls_workspace: Any
-    meshes: tuple[int, ...]
+    exact: tuple[int, ...]
 
 
 Pairs = Sequence[tuple[int, int, tuple[Body, Body]]]
@@ -43,7 +43,7 @@ def self_pairs(tree: Tree, bodies: Sequence[tuple[int, Body]], pairs: Pairs) -> 
 
     Args:
         bodies: Each with the number of its link.
-        pairs: Numbers of two bodies, and the bodies to check: themselves or their exact meshes.
+        pairs: Numbers of two bodies, and the bodies to check: themselves or their exact surfaces.
     """
     geometry, hulls = pin.GeometryModel(), pin.GeometryModel()
     numbers: dict[tuple[int, int], int] = {}
@@ -107,14 +107,14 @@ def nearest_pair(
     everywhere = all_positions(model, positions)
     inner, data = model._pinocchio, model._workspace
     nearest = pin.computeDistances(inner, data, own.hulls, own.hulls_workspace, everywhere)
-    if nearest not in own.meshes:
+    if nearest not in own.exact:
         result = own.hulls_workspace.distanceResults[nearest]
         return nearest, result.min_distance, _points(result)
     results = list(own.hulls_workspace.distanceResults)
     distances = np.array([result.min_distance for result in results])
     pin.updateGeometryPlacements(inner, data, own.geometry, own.workspace)
-    # A mesh is never nearer than its hull, so measure as meshes only the pairs with the nearest hulls.
-    left = set(own.meshes)
+    # A surface is never nearer than its hull, so measure as surfaces only the pairs with the nearest hulls.
+    left = set(own.exact)
     while (number := int(distances.argmin())) in left:
         left.remove(number)
         results[number] = pin.computeDistance(own.geometry, own.workspace, number)

@@ -21,7 +21,7 @@ class Surface:
 
     @cached_property
     def exact(self) -> Any:
-        """Coal's mesh of the surface."""
+        """Coal's geometry of the surface."""
         return exact_body(self.triangles).geometry
 
     @cached_property

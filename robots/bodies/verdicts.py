@@ -12,22 +12,22 @@ class Kind(StrEnum):
     DESCRIPTION = "description"
     SRDF = "srdf"
     ALWAYS = "always"
-    # The hulls are apart at home. Elsewhere they seldom touch, or the meshes touch too.
+    # The hulls are apart at home. Elsewhere they seldom touch, or the surfaces touch too.
     APART = "apart"
     # The hulls are apart at home and touch in many other positions.
     FALSE_CONTACTS = "false_contacts"
     TOO_LARGE = "too_large"
     # The hulls touch at home.
-    COLLISION_MESHES = "collision_meshes"
-    VISUAL_MESHES = "visual_meshes"
+    COLLISION_SURFACES = "collision_meshes"
+    VISUAL_SURFACES = "visual_meshes"
     TOUCHING = "touching"
     NO_SURFACE = "no_surface"
     NOT_STUDIED = "not_studied"
 
 
 IGNORED = frozenset({Kind.ADJACENT, Kind.DESCRIPTION, Kind.SRDF, Kind.ALWAYS})
-# Kinds that are checked with exact meshes.
-EXACT = frozenset({Kind.FALSE_CONTACTS, Kind.COLLISION_MESHES, Kind.VISUAL_MESHES})
+# Kinds that are checked with exact surfaces.
+EXACT = frozenset({Kind.FALSE_CONTACTS, Kind.COLLISION_SURFACES, Kind.VISUAL_SURFACES})
 # The hulls are apart at home; the texts give a share of the positions.
 ELSEWHERE = frozenset({Kind.FALSE_CONTACTS, Kind.TOO_LARGE})
 
@@ -41,8 +41,8 @@ _TEXTS: Mapping[Kind, str] = {
     "checked as exact collision meshes",
     Kind.TOO_LARGE: "their hulls touch in {percent} % of positions: hulls are checked, for the exact meshes "
     "have over {triangles:,} triangles",
-    Kind.COLLISION_MESHES: "only their hulls touch at home: checked as exact collision meshes",
-    Kind.VISUAL_MESHES: "only their hulls touch at home: checked as exact visual meshes",
+    Kind.COLLISION_SURFACES: "only their hulls touch at home: checked as exact collision meshes",
+    Kind.VISUAL_SURFACES: "only their hulls touch at home: checked as exact visual meshes",
     Kind.TOUCHING: "they touch at home, as exact meshes too, which is no reason to ignore them",
     Kind.NO_SURFACE: "they touch at home; one has no surface, so hulls are checked",
     Kind.NOT_STUDIED: "the study of them failed or took over {seconds} s or {gigabytes} GB: "

@@ -130,7 +130,7 @@ class _Timing:
 
 
 class _Checker:
-    """Accumulator of the time and the findings of consecutive steps."""
+    """Accumulator of the time and the problems of consecutive steps."""
 
     def __init__(self, joints: Joints) -> None:
         self.time_s = 0.0
@@ -168,17 +168,17 @@ class _Checker:
         self.path.add(times, segment.positions, segment.tools, speeds, segment.clearances, step.line)
         if segment.limits and timing.duration_s > 0:
             self.limits.append(_limit_violation(step.line, segment.limits, self.time_s, times[-1]))
-        for index, finding in segment.findings:
+        for index, problem in segment.problems:
             self.runs.add(
                 line=step.line,
                 sample=self._sample + index,
                 time_s=float(times[index]),
-                kind=finding.kind,
-                value=finding.value,
-                limit=finding.limit,
-                pair=finding.pair,
-                points=finding.points,
-                stops=finding.stops,
+                kind=problem.kind,
+                value=problem.value,
+                limit=problem.limit,
+                pair=problem.pair,
+                points=problem.points,
+                stops=problem.stops,
             )
         if step.tool_speed is not None:
             self._check_tool_speed(step, speeds, times, step.tool_speed)

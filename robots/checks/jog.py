@@ -45,7 +45,7 @@ class JogPart:
         moved: Distance of the arm from the origin [m] or [rad].
         percent: Speed of the motion to `target`, as a percentage of the joints' maximum speeds.
         end: Why the jog cannot go on beyond `commanded`; None: it can, as far as is known.
-        violations: Findings about the part that do not end it.
+        violations: Problems of the part that do not end it.
     """
 
     target: FloatArray | None

@@ -30,7 +30,7 @@ _Key: TypeAlias = tuple[bytes, bytes, bool]
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
+class SampleProblem:
     """A problem at a sample.
 
     Attributes:
@@ -59,7 +59,7 @@ class Segment:
         tools: (m, 3) in the base frame [m].
         rates: (m,) the tool's speed per share of the motion [m].
         clearances: (m,) [m].
-        findings: Each with its sample's number, ascending.
+        problems: Each with its sample's number, ascending.
         limits: Limits that the target violates.
     """
 
@@ -67,7 +67,7 @@ class Segment:
     tools: FloatArray
     rates: FloatArray
     clearances: FloatArray
-    findings: tuple[tuple[int, Finding], ...]
+    problems: tuple[tuple[int, SampleProblem], ...]
     limits: tuple[Reason, ...]
 
 
@@ -149,44 +149,50 @@ class SegmentChecker:
         along = path_encounters(
             self._cell, self._robot, positions, self._others, within_m=near_m, far=self._far
         )
-        numbered = [found for each in along.encounters for found in self._findings(each)]
+        numbered = [found for each in along.encounters for found in self._problems(each)]
         numbered.sort(key=itemgetter(0))
         numbers = [number for number, _ in numbered]
         tools, jacobians = tools_and_jacobians(self._chain, positions)
         begin = 0
         for each, end in zip(requests, ends, strict=True):
             here = slice(begin, end)
-            findings = [
-                (number - begin, finding)
-                for number, finding in numbered[bisect_left(numbers, begin) : bisect_left(numbers, end)]
+            problems = [
+                (number - begin, problem)
+                for number, problem in numbered[bisect_left(numbers, begin) : bisect_left(numbers, end)]
             ]
             if each.along_line:
                 types, reach = arm.joints.types, self._chain.reach_m
-                findings += _singular(singularity_margins(jacobians[here], types, reach=reach))
+                problems += _singular(singularity_margins(jacobians[here], types, reach=reach))
             yield Segment(
                 positions=each.positions,
                 tools=tools[here, :3, 3],
                 rates=np.linalg.norm(jacobians[here, :3] @ (each.target - each.start), axis=1),
                 clearances=along.clearances[here],
-                findings=tuple(sorted(findings, key=itemgetter(0))),
+                problems=tuple(sorted(problems, key=itemgetter(0))),
                 limits=violations(arm.joints, each.target),
             )
             begin = end
 
-    def _findings(self, encounter: Encounter) -> Iterator[tuple[int, Finding]]:
+    def _problems(self, encounter: Encounter) -> Iterator[tuple[int, SampleProblem]]:
         warning, stop = (0.0, 0.0) if encounter.own else distances(self._cell, encounter.pair)
         samples, all_distances = encounter.samples.tolist(), encounter.distances.tolist()
         for index, distance, points in zip(samples, all_distances, encounter.points, strict=True):
             if distance <= 0.0:
-                yield index, Finding(ViolationKind.COLLISION, encounter.pair, distance, 0.0, points)
+                yield index, SampleProblem(ViolationKind.COLLISION, encounter.pair, distance, 0.0, points)
             elif distance < warning:
                 stops = distance < stop
                 limit = stop if stops else warning
-                yield index, Finding(ViolationKind.CLEARANCE, encounter.pair, distance, limit, points, stops)
+                yield (
+                    index,
+                    SampleProblem(ViolationKind.CLEARANCE, encounter.pair, distance, limit, points, stops),
+                )
 
 
-def _singular(margins: FloatArray) -> list[tuple[int, Finding]]:
+def _singular(margins: FloatArray) -> list[tuple[int, SampleProblem]]:
     return [
-        (index, Finding(ViolationKind.SINGULARITY, (), float(margins[index]), SINGULAR, np.zeros((0, 3))))
+        (
+            index,
+            SampleProblem(ViolationKind.SINGULARITY, (), float(margins[index]), SINGULAR, np.zeros((0, 3))),
+        )
         for index in np.flatnonzero(margins < SINGULAR).tolist()
     ]

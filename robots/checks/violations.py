@@ -1,4 +1,4 @@
-"""Collector of violations: merges findings at adjacent samples to violations with a duration."""
+"""Collector of violations: merges problems at adjacent samples to violations with a duration."""
 
 from dataclasses import dataclass, field
 
@@ -74,7 +74,7 @@ class Runs:
         stops: bool = True,
         within: int = 1,
     ) -> None:
-        """Add a finding at a sample; samples are in order and count from 0 through the whole motion.
+        """Add a problem at a sample; samples are in order and count from 0 through the whole motion.
 
         Args:
             value: The measured value, the smaller the worse: a distance [m], a margin, a negated speed.

@@ -19,7 +19,7 @@ from robots.descriptions.description import load
 from robots.kinematics.joints import FloatArray, Joints
 from robots.kinematics.kinematic_tree import BASE, Tree, bare_links, tree_of
 from robots.kinematics.model import RobotModel, build_model
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.robot_toml import Model, RobotDescription, UrdfDescription, nearest
 
 
@@ -119,13 +119,13 @@ def build_cell(description: CellDescription, *, exact: bool = False, wait: bool 
     """Read the robots and fixtures of a cell.
 
     Args:
-        exact: Check links as meshes instead of hulls: distances are about a hundred times slower.
+        exact: Check links as surfaces instead of hulls: distances are about a hundred times slower.
         wait: Wait for the studies of links with touching hulls. Otherwise the studies continue and the cell
             is `pending`.
 
     Raises:
         DescriptionError: If a robot's description has a problem.
-        MeshError: If a mesh cannot be read, or a fixture has no surface.
+        ShapeError: If a shape cannot be read, or a fixture has no surface.
     """
     arms = {robot.name: _arm(robot, exact=exact, wait=wait) for robot in description.robots}
     links = {f"{arm.name}/{link}" for arm in arms.values() for link in arm.model.link_names}
@@ -181,10 +181,10 @@ def _fixture_obstacles(fixture: Fixture, links: set[str]) -> Obstacles:
     for link in fixture.ignore:
         if link not in links:
             hint = nearest(link, sorted(links))
-            raise MeshError(source, f"ignore {link!r}: no such link in its cell{hint}")
+            raise ShapeError(source, f"ignore {link!r}: no such link in its cell{hint}")
     bodies = (exact_bodies if fixture.exact else piece_bodies)(fixture.shapes)
     if not bodies:
-        raise MeshError(source, "has no surface, so it cannot be checked for collisions")
+        raise ShapeError(source, "has no surface, so it cannot be checked for collisions")
     placements = np.tile(np.asarray(fixture.fixture_to_site, dtype=np.float64), (len(bodies), 1, 1))
     moving = np.zeros(len(bodies), dtype=np.bool_)
     return Obstacles((fixture.name,) * len(bodies), bodies, placements, moving, bounds_of(bodies))
@@ -198,7 +198,7 @@ def pending(cell: Cell) -> tuple[str, ...]:
 def unshaped(cell: Cell, robot: str) -> tuple[str, ...]:
     """Return the links of an arm without a shape, which no check covers.
 
-    A frame on a link with a shape does not count, unless mesh files are missing: one may be its mesh.
+    A frame on a link with a shape does not count, unless shape files are missing: one may be its shape.
     """
     return tuple(cell.arms[robot].tree.links[number].name for number in _bare(cell, robot))
 
@@ -212,13 +212,13 @@ def unshaped_moving(cell: Cell, robot: str) -> tuple[str, ...]:
 def _bare(cell: Cell, robot: str) -> tuple[int, ...]:
     arm = cell.arms[robot]
     shaped = set(arm.links.tolist())
-    if missing_meshes(cell, robot):
+    if missing_shapes(cell, robot):
         return tuple(number for number in range(len(arm.tree.links)) if number not in shaped)
     return bare_links(arm.tree, shaped)
 
 
-def missing_meshes(cell: Cell, robot: str) -> tuple[str, ...]:
-    """Return the mesh files of an arm that were not found, as its description names them."""
+def missing_shapes(cell: Cell, robot: str) -> tuple[str, ...]:
+    """Return the shape files of an arm that were not found, as its description names them."""
     description = cell.arms[robot].description
     return description.robot.unchecked if isinstance(description, UrdfDescription) else ()
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.bodies.geometry import TOUCH_M, Body
+from robots.collision.bisection import Placed, touching_share
 from robots.collision.cell import Arm, Cell
 from robots.collision.distance import Gauge
 from robots.collision.floor import Heights, heights_on_path
-from robots.collision.interpolated import Placed, touching_share
 from robots.collision.obstacles import join_boxes, least_distances
 from robots.collision.path import placements_along, travelled
 from robots.collision.swept_volumes import Sweep, distance_to_sweep, sweeps_of, swept_region

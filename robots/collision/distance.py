@@ -50,7 +50,7 @@ class Gauge:
         return 0.0 if found <= TOUCH_M else float(found)
 
     def bound(self, one: Body, one_at: Any, other: Body, other_at: Any) -> float:
-        """Return a lower bound of `distance`, from the hulls of two meshes; 0 only if the meshes touch."""
+        """Return a lower bound of `distance`, from the hulls of two surfaces; 0 only if they touch."""
         if one.hull is not None and other.hull is not None:
             self._result.clear()
             found = coal.distance(one.hull, one_at, other.hull, other_at, self._request, self._result)
@@ -62,7 +62,7 @@ class Gauge:
         """Return the contact or nearest point (3,) on each of the bodies of the last `distance` call [m]."""
         found = self._result
         if found.min_distance <= TOUCH_M:
-            # Coal's distance gives no points for meshes that touch.
+            # Coal's distance gives no points for surfaces that touch.
             contact = coal.CollisionResult()
             request = coal.CollisionRequest(coal.CONTACT, 1)
             if coal.collide(one.geometry, one_at, other.geometry, other_at, request, contact):
@@ -129,7 +129,7 @@ def own_nearest(cell: Cell, robot: str, positions: FloatArray) -> Nearest | None
     if found is None:
         return None
     if found[1] <= TOUCH_M and (touching := own_contacts(cell, robot, positions)):
-        return touching[0]  # coal's distance gives no points for meshes that touch
+        return touching[0]  # coal's distance gives no points for surfaces that touch
     return _self_pair(arm, *found)
 
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.bodies.geometry import TOUCH_M
+from robots.collision.bisection import ROUND
 from robots.collision.cell import Arm
-from robots.collision.interpolated import ROUND
 from robots.collision.path import SAMPLE_M, placements_along
 from robots.descriptions.cells import Floor
 from robots.kinematics.joints import FloatArray

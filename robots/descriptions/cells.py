@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.robot_toml import Model
-from robots.shapes.mesh import Color
+from robots.shapes.geometry import Color
 
 # Default clearances between an arm and the fixtures and other robots of its cell.
 WARNING_M = 0.05
@@ -26,7 +26,7 @@ class Fixture:
         shapes: In the fixture's frame [m].
         fixture_to_site: (4, 4) [m].
         color: None keeps the shapes' colours.
-        exact: Check the meshes, not a hull of each piece: slower, but an arm can reach into the fixture.
+        exact: Check the shapes, not a hull of each piece: slower, but an arm can reach into the fixture.
         ignore: Links that may touch the fixture, as "<robot>/<link>".
     """
 

@@ -27,7 +27,7 @@ from robots.descriptions.urdf.read import MOST_URDF_BYTES, UrdfRobot, read_urdf
 from robots.descriptions.urdf.srdf import ignored_beside
 from robots.schema.bounded_toml import MOST_CHARACTERS, parse_toml
 from robots.schema.description_checks import Problem, Step, file_problems, row_problems, type_problem
-from robots.schema.errors import DescriptionError, MeshError
+from robots.schema.errors import DescriptionError, ShapeError
 from robots.schema.robot_toml import (
     DhDescription,
     JointSettings,
@@ -142,7 +142,7 @@ def robot_name(word: str) -> str:
 
 
 def parse(text: str, source: Path, *, confined: bool = False) -> RobotDescription:
-    """Parse a robot.toml's text; mesh files are relative to the folder of `source`.
+    """Parse a robot.toml's text; shape files are relative to the folder of `source`.
 
     Raises:
         DescriptionError: See `load`.
@@ -225,7 +225,7 @@ def _urdf_robot(description: UrdfDescription, *, confined: bool) -> UrdfRobot:
 
         try:
             found = read_vrml_robot(urdf, within=description.folder_around(urdf))
-        except MeshError as error:
+        except ShapeError as error:
             place = f"{error.place}: " if error.place else ""
             raise DescriptionError(error.source, [f"{place}{error.reason}"]) from error
         return UrdfRobot(found.name, found.tree, found.notes)

@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robots.descriptions.description import ROBOT_FILES, describe_urdf, load, robot_name
-from robots.descriptions.glb import collision_meshes, glb_of, link_mesh, link_meshes
+from robots.descriptions.glb import collision_glbs, glb_of, link_geometry, link_glbs
 from robots.descriptions.urdf.write import collision_beside, glb_beside, tree_urdf
 from robots.descriptions.urdf_to_dh import dh_form
 from robots.kinematics.joints import doubt_notes
@@ -15,7 +15,7 @@ from robots.kinematics.kinematic_tree import tree_of
 from robots.schema.bounded_toml import parse_toml
 from robots.schema.errors import DescriptionError
 from robots.schema.robot_toml import DhDescription, RobotDescription, UrdfDescription
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class ImportedRobot:
         values: The values of its robot.toml.
         files: Content by path relative to the robot.toml.
         notes: Oddities and changes, a sentence each.
-        missing: Mesh files that were not found, as the source names them.
+        missing: Shape files that were not found, as the source names them.
     """
 
     values: dict[str, Any]
@@ -44,7 +44,7 @@ def import_robot(source: str, *, packages: Sequence[Path] = (), as_dh: bool = Fa
 
     Raises:
         DescriptionError: If the robot has a problem.
-        MeshError: If one of its meshes cannot be read.
+        ShapeError: If one of its shapes cannot be read.
     """
     path = Path(source)
     if path.suffix.lower() in ROBOT_FILES:
@@ -60,8 +60,8 @@ def import_robot(source: str, *, packages: Sequence[Path] = (), as_dh: bool = Fa
 
 
 def _import_urdf(description: UrdfDescription) -> ImportedRobot:
-    """Write the tree as a new URDF with GLB meshes; values that URDF cannot hold stay in the robot.toml."""
-    meshes = link_meshes(description)
+    """Write the tree as a new URDF with GLB shapes; values that URDF cannot hold stay in the robot.toml."""
+    shapes = link_glbs(description)
     values = description.model_dump(mode="json", by_alias=True, exclude_unset=True)
     values |= {"urdf": f"{description.name}.urdf", "provenance": _provenance(description)}
     for key in ("packages", "link"):  # package addresses are resolved, link colours are in the GLB
@@ -70,8 +70,8 @@ def _import_urdf(description: UrdfDescription) -> ImportedRobot:
         pairs = [*description.collision.ignore, *(pair for pair, _ in description.robot.ignored)]
         values["collision"] = {"ignore": [list(pair) for pair in dict.fromkeys(pairs)]}
     text = tree_urdf(description.name, tree_of(description))
-    files = {values["urdf"]: text.encode()} | {glb_beside(link): glb for link, glb in meshes.items()}
-    files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
+    files = {values["urdf"]: text.encode()} | {glb_beside(link): glb for link, glb in shapes.items()}
+    files |= {collision_beside(link): glb for link, glb in collision_glbs(description).items()}
     robot = description.robot
     return ImportedRobot(values, files, (*robot.notes, *doubt_notes(description)), tuple(robot.missing))
 
@@ -81,7 +81,7 @@ def import_as_dh(description: UrdfDescription) -> ImportedRobot:
 
     Raises:
         DescriptionError: If D-H rows cannot describe the chain.
-        MeshError: If one of its meshes cannot be read.
+        ShapeError: If one of its shapes cannot be read.
     """
     form = dh_form(description)
     values, files = dict(form.values), {}
@@ -94,7 +94,7 @@ def import_as_dh(description: UrdfDescription) -> ImportedRobot:
         for (link, shapes), body in zip(of_links.items(), bodies, strict=True):
             if shapes:
                 body |= {key: address(link), "mesh_scale": 1.0}
-                files[body[key]] = glb_of(link_mesh(shapes))
+                files[body[key]] = glb_of(link_geometry(shapes))
     robot = description.robot
     notes = (*robot.notes, *doubt_notes(description), *form.notes)
     return ImportedRobot(values, files, notes, tuple(robot.missing))
@@ -105,7 +105,7 @@ def _provenance(description: RobotDescription) -> str:
 
 
 def _copy_description(description: DhDescription) -> ImportedRobot:
-    """Copy a D-H description, its mesh files and the files that these name, all below the robot's folder."""
+    """Copy a D-H description, its shape files and the files that these name, all below the robot's folder."""
     values = parse_toml(description.text)
     files: dict[str, bytes] = {}
     places: dict[Path, str] = {}
@@ -120,9 +120,9 @@ def _copy_description(description: DhDescription) -> ImportedRobot:
                 places[path] = _path_in_robot(str(table[key]), set(files))
                 files[places[path]] = _bytes(path)
                 folder = description.folder_around(path)
-                mesh = read_mesh(path, within=folder)
-                notes += [_missing_file_note(path, places[path], name, folder) for name in mesh.missing]
-                notes += _copy_references(path, places[path], mesh.files, files)
+                geometry = read_geometry(path, within=folder)
+                notes += [_missing_file_note(path, places[path], name, folder) for name in geometry.missing]
+                notes += _copy_references(path, places[path], geometry.files, files)
             table[key] = places[path]
     return ImportedRobot(values, files, tuple(notes), ())
 
@@ -136,7 +136,7 @@ def _missing_file_note(path: Path, place: str, address: str, folder: Path) -> st
 def _copy_references(
     path: Path, place: str, others: Sequence[Path], files: dict[str, bytes]
 ) -> Iterator[str]:
-    """Add the files that a mesh file names, with the same path relative to its copy.
+    """Add the files that a shape file names, with the same path relative to its copy.
 
     Yields:
         A note on each file that cannot be copied.
@@ -154,9 +154,9 @@ def _copy_references(
             yield f"{place} names {address!r}, and so does another mesh for another file; one is copied"
 
 
-def _path_in_robot(mesh: str, taken: set[str]) -> str:
-    """Return an unused path for a mesh below the robot's folder; unchanged if possible."""
-    path = PurePosixPath(mesh)
+def _path_in_robot(geometry: str, taken: set[str]) -> str:
+    """Return an unused path for a shape below the robot's folder; unchanged if possible."""
+    path = PurePosixPath(geometry)
     if path.is_absolute() or ".." in path.parts:
         path = PurePosixPath("meshes", path.name)
     wanted, number = path, 2

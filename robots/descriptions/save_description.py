@@ -1,4 +1,4 @@
-"""Writer of a robot's folder: its robot.toml and mesh files.
+"""Writer of a robot's folder: its robot.toml and shape files.
 
 The new folder is written completely next to the old one, then the two are exchanged in one atomic step.
 If the process is killed or the disk is full, the folder holds the old robot or the new one, never a mixture.

@@ -1,4 +1,4 @@
-"""Summaries of descriptions and meshes for users and programs, in SI."""
+"""Summaries of descriptions and shapes for users and programs, in SI."""
 
 from collections import Counter
 from pathlib import Path
@@ -13,7 +13,7 @@ from robots.kinematics.views import reach, views_of
 from robots.schema.errors import DescriptionError
 from robots.schema.robot_toml import DhDescription, RobotDescription, UrdfDescription
 from robots.schema.units import angle_factor, length_factor
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
 
 def description_summary(description: RobotDescription) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def description_summary(description: RobotDescription) -> dict[str, Any]:
             for constraint in joints.constraints
         ],
         "links": [
-            {"name": link.name, "meshes": [_mesh_name(shape) for shape in link.shapes]}
+            {"name": link.name, "meshes": [_shape_name(shape) for shape in link.shapes]}
             for link in tree_of(description).links
         ],
         "dh": dh_summary(description),
@@ -97,30 +97,30 @@ def dh_summary(description: RobotDescription) -> dict[str, Any] | None:
     return {"rows": rows, "start": start, "notes": list(notes)}
 
 
-def _mesh_name(shape: Shape) -> str:
-    return shape.mesh.name if isinstance(shape.mesh, Path) else "made by the URDF"
+def _shape_name(shape: Shape) -> str:
+    return shape.source.name if isinstance(shape.source, Path) else "made by the URDF"
 
 
-def mesh_summary(mesh: Mesh) -> dict[str, Any]:
-    """Return triangles, bounds, materials, colours and warnings of a mesh file, in its units and axes.
+def geometry_summary(geometry: Geometry) -> dict[str, Any]:
+    """Return triangles, bounds, materials, colours and warnings of a shape file, in its units and axes.
 
     Colours are sRGB as #rrggbb, or #rrggbbaa if not opaque; vertex colours are counted.
     """
-    low, high = bounds(mesh)
+    low, high = bounds(geometry)
     return {
-        "triangles": mesh.triangle_count,
+        "triangles": geometry.triangle_count,
         "min": low.tolist(),
         "max": high.tolist(),
-        "materials": sorted({part.material.name for part in mesh.parts}),
-        "colors": _colors(mesh),
-        "warnings": list(mesh.warnings),
+        "materials": sorted({part.material.name for part in geometry.parts}),
+        "colors": _colors(geometry),
+        "warnings": list(geometry.warnings),
     }
 
 
-def _colors(mesh: Mesh) -> list[str]:
+def _colors(geometry: Geometry) -> list[str]:
     """Return every colour of the parts, the one with the most triangles first."""
     triangles: Counter[str] = Counter()
-    for part in mesh.parts:
+    for part in geometry.parts:
         if part.colors is None:
             named = _color(*part.material.diffuse, 1.0 - part.material.transparency)
         else:

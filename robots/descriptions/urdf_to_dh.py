@@ -40,7 +40,7 @@ class DhForm:
     """A robot as D-H rows.
 
     Attributes:
-        values: The values of its robot.toml, in degrees and millimetres, without meshes.
+        values: The values of its robot.toml, in degrees and millimetres, without shapes.
         shapes: Each link's shapes by name, "base" first, in the link's frame [m].
         collision: Each link's separate collision shapes, likewise; empty without any.
         notes: Changes of the conversion, a sentence each.

@@ -5,7 +5,7 @@
                 llimit, ulimit, lvlimit, uvlimit, children [ Joint or Segment ]
     Segment     children: the link's shapes
 
-In SI, as OpenHRP. `robots.shapes.files.vrml.drawing` reads such a file as a mesh with all joints at zero.
+In SI, as OpenHRP. `robots.shapes.files.vrml.drawing` reads such a file as a shape with all joints at zero.
 """
 
 import re
@@ -16,7 +16,7 @@ import numpy as np
 
 from robots.descriptions.urdf.limits import REACH, SPEED, probable_range, probable_speed
 from robots.kinematics.kinematic_tree import BASE, FloatArray, Shape, Tree, TreeJoint, TreeLink
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.robot_toml import JointType
 from robots.shapes.files.vrml.drawing import Drawing
 from robots.shapes.files.vrml.files import Files
@@ -24,7 +24,7 @@ from robots.shapes.files.vrml.parser import MAX_DEPTH, Node
 from robots.shapes.files.vrml.protos import found_proto, instance
 from robots.shapes.files.vrml.transform import transform_matrix
 from robots.shapes.files.vrml.values import nodes_of, number, numbers, strings
-from robots.shapes.mesh import Mesh
+from robots.shapes.geometry import Geometry
 
 _TYPES = {
     "rotate": JointType.ROTARY,
@@ -52,20 +52,20 @@ class VrmlRobot:
 
 
 def read_vrml_robot(path: Path, *, within: Path | None = None) -> VrmlRobot:
-    """Read the robot in a VRML file: joints in the order of jointId, and the meshes of its links.
+    """Read the robot in a VRML file: joints in the order of jointId, and the shapes of its links.
 
     Args:
         within: Read only files below this folder; others count as missing.
 
     Raises:
-        MeshError: If the file cannot be read, or has no movable joint or an invalid one.
+        ShapeError: If the file cannot be read, or has no movable joint or an invalid one.
     """
     files = Files(within)
     reading = _Reading(Drawing(files), path if within is None else path.resolve())
     for node in files.scene(reading.path).nodes:
         reading.node(node, BASE, np.eye(4), 0)
     if not reading.joints:
-        raise MeshError(path, "holds no robot: no Joint with a jointType of 'rotate' or 'slide'")
+        raise ShapeError(path, "holds no robot: no Joint with a jointType of 'rotate' or 'slide'")
     reading.drawing.warn_of_skipped()
     tree = reading.tree()
     return VrmlRobot(reading.name or path.stem, tree, (*files.warnings(), *reading.notes))
@@ -184,8 +184,8 @@ class _Reading:
         drawing, first, first_wire = self.drawing, len(self.drawing.parts), len(self.drawing.wires)
         for node in nodes:
             drawing.draw(node, np.eye(4), (self.path, self.path.resolve()))
-        mesh = Mesh(tuple(drawing.parts[first:]), wires=tuple(drawing.wires[first_wire:]))
-        shapes = (Shape(mesh, np.eye(4)),) if mesh.parts or mesh.wires else ()
+        geometry = Geometry(tuple(drawing.parts[first:]), wires=tuple(drawing.wires[first_wire:]))
+        shapes = (Shape(geometry, np.eye(4)),) if geometry.parts or geometry.wires else ()
         if not shapes and not even_bare:
             return
         self.links.append(TreeLink(self.unique(name), joint, placement, shapes))

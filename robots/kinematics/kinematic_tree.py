@@ -23,7 +23,7 @@ from robots.schema.robot_toml import (
     UrdfDescription,
 )
 from robots.schema.units import angle_factor, length_factor
-from robots.shapes.mesh import Color, Mesh
+from robots.shapes.geometry import Color, Geometry
 
 FloatArray = NDArray[np.float64]
 
@@ -102,19 +102,19 @@ class TreeJoint:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A shape of a link: a mesh file or a generated mesh.
+    """A shape of a link: a file or a generated geometry.
 
     Attributes:
-        mesh: A file, or a generated mesh (a box, a cylinder, a sphere).
+        source: A file, or a generated shape (a box, a cylinder, a sphere).
         shape_to_link: (4, 4) from the file's units and axes to the link's frame [m], including the scale.
         color: Colour of the materials named "paint", or of all materials if none has this name; None keeps
-            the mesh's colours.
-        opacity: 0 to 1; None keeps the mesh's opacity.
+            the shape's colours.
+        opacity: 0 to 1; None keeps the shape's opacity.
         in_stated_unit: Apply the unit that the file states, if any (COLLADA), and turn glTF's y up to z up.
-        within: Read only files below this folder when the mesh file names them; None: any folder.
+        within: Read only files below this folder when the shape file names them; None: any folder.
     """
 
-    mesh: Path | Mesh
+    source: Path | Geometry
     shape_to_link: FloatArray
     color: Color | None = None
     opacity: float | None = None
@@ -183,11 +183,15 @@ def tree_of(description: RobotDescription) -> Tree:
 
 
 def _confined(tree: Tree, description: RobotDescription) -> Tree:
-    """Return the tree with each mesh file's references limited to its `folder_around`."""
+    """Return the tree with each shape file's references limited to its `folder_around`."""
 
     def confined(shape: Shape) -> Shape:
-        mesh = shape.mesh
-        return replace(shape, within=description.folder_around(mesh)) if isinstance(mesh, Path) else shape
+        geometry = shape.source
+        return (
+            replace(shape, within=description.folder_around(geometry))
+            if isinstance(geometry, Path)
+            else shape
+        )
 
     return replace(
         tree,

@@ -1,1 +1,1 @@
-"""Library of robots: a folder for each, with its description and meshes. CONTRIBUTING says how to add one."""
+"""Library of robots: a folder for each, with its description and shapes. CONTRIBUTING says how to add one."""

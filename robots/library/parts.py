@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from robots.shapes.mesh import FloatArray, Material, Mesh, Part
+from robots.shapes.geometry import FloatArray, Geometry, Material, Part
 from robots.shapes.normals import creased
 from robots.shapes.solids import Profile, Solid, lofted, moved, plate, rectangle, rounded, strap, turned
 
@@ -181,12 +181,12 @@ def _rounded_end(station: FloatArray, direction: int) -> FloatArray:
     return sections[::direction]
 
 
-def mesh_of(pieces: Iterable[Piece]) -> Mesh:
-    """Return pieces as a mesh with a part for each material, smooth except at creases."""
+def geometry_of(pieces: Iterable[Piece]) -> Geometry:
+    """Return pieces as a shape with a part for each material, smooth except at creases."""
     by_material: dict[Material, list[Solid]] = {}
     for material, solid in pieces:
         by_material.setdefault(material, []).append(solid)
-    return Mesh(tuple(_part(material, solids) for material, solids in by_material.items()))
+    return Geometry(tuple(_part(material, solids) for material, solids in by_material.items()))
 
 
 def _part(material: Material, solids: Sequence[Solid]) -> Part:

@@ -22,7 +22,7 @@ from robots.library.parts import (
     tapered,
     turned_piece,
 )
-from robots.shapes.mesh import FloatArray
+from robots.shapes.geometry import FloatArray
 from robots.shapes.solids import lofted, plate, rectangle, tube
 
 # From x forward, y left, z up to the column's frame, which has x forward and y up.

@@ -19,7 +19,7 @@ from robots.kinematics.joints import FloatArray
 from robots.programs import MOST_BYTES
 from robots.programs.text import MOST_LINES, pose_of
 from robots.programs.write import number, pose_words
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.poses import rpy_rotation
 from robots.schema.robot_toml import nearest
 from robots.shapes.files.declared_size import content
@@ -82,33 +82,33 @@ def program_from_dxf(path: Path, selection: DxfPath) -> str:
     """Return the text of a program that follows curves of a drawing, in the drawing's order.
 
     Raises:
-        MeshError: If the file is not DXF, does not have such curves, or they exceed the size of a program.
+        ShapeError: If the file is not DXF, does not have such curves, or they exceed the size of a program.
     """
     content(path)
     try:
         drawing, _ = open_drawing(path)
         unit_mm = UNITS_M.get(int(drawing.header.get("$INSUNITS", 0) or 0), 0.0) * 1000 or selection.unit_mm
         if not unit_mm:
-            raise MeshError(path, "does not state its unit ($INSUNITS); give it with --unit, in mm")
+            raise ShapeError(path, "does not state its unit ($INSUNITS); give it with --unit, in mm")
         which, selected = _selected(path, drawing, selection)
         curves, count = [], 0
         for each in selected:
             curves.append(_placed(path, each, selection.tolerance_mm / unit_mm) * unit_mm)
             count += len(curves[-1])
             if count > _MOST_POINTS:
-                raise MeshError(path, _TOO_LARGE.format(count=count))
-    except MeshError:
+                raise ShapeError(path, _TOO_LARGE.format(count=count))
+    except ShapeError:
         raise
     except MemoryError as error:
-        raise MeshError(path, "needs more memory than is available") from error
+        raise ShapeError(path, "needs more memory than is available") from error
     # ezdxf raises arbitrary exceptions on damaged files.
     except Exception as error:
         first = next(iter(str(error).splitlines()), "")[:200]
-        raise MeshError(path, f"cannot be read as DXF: {first or type(error).__name__}") from error
+        raise ShapeError(path, f"cannot be read as DXF: {first or type(error).__name__}") from error
     chains = [_distinct(chain) for chain in _joined(curves)]
     chains = [chain for chain in chains if len(chain) > 1]
     if not chains:
-        raise MeshError(path, "its curves have no length")
+        raise ShapeError(path, "its curves have no length")
     what = f"{path.name}, {which}: {len(chains)} path{'s' if len(chains) > 1 else ''}"
     comment = f"# {what}, curves flattened to {number(selection.tolerance_mm)} mm"
     # A file or layer name may contain a line break.
@@ -116,7 +116,7 @@ def program_from_dxf(path: Path, selection: DxfPath) -> str:
     text = "".join(f"{line}\n" for line in lines)
     if len(text.encode()) > MOST_BYTES or len(lines) > MOST_LINES:
         count = sum(len(chain) for chain in chains)
-        raise MeshError(path, _TOO_LARGE.format(count=count))
+        raise ShapeError(path, _TOO_LARGE.format(count=count))
     return text
 
 
@@ -128,19 +128,19 @@ def _selected(path: Path, drawing: Any, selection: DxfPath) -> tuple[str, list[_
     if selection.handle:
         found = [each for each in curves if selection.handle.lower() in each.handles]
         if not found:
-            raise MeshError(path, f"has no curve of handle {selection.handle!r} in its model space")
+            raise ShapeError(path, f"has no curve of handle {selection.handle!r} in its model space")
         return f"curve {selection.handle}", found
     layers = Counter(each.layer for each in curves)
     layer = selection.layer or (next(iter(layers)) if len(layers) == 1 else "")
     if not layer:
         known = ", ".join(f"{name} ({count})" for name, count in sorted(layers.items())[:20])
-        raise MeshError(path, f"no curves selected. Name a layer or a handle; curves: {known or 'none'}")
+        raise ShapeError(path, f"no curves selected. Name a layer or a handle; curves: {known or 'none'}")
     found = [each for each in curves if each.layer.lower() == layer.lower()]
     if not found:
         hint = nearest(layer, sorted(layers)) if layers else "; it has no curves"
-        raise MeshError(path, f"has no curve on layer {layer!r}{hint}")
+        raise ShapeError(path, f"has no curve on layer {layer!r}{hint}")
     if len(found) > _MOST_CURVES:
-        raise MeshError(path, f"has {len(found)} curves on layer {layer!r}; up to {_MOST_CURVES} are read")
+        raise ShapeError(path, f"has {len(found)} curves on layer {layer!r}; up to {_MOST_CURVES} are read")
     return f"layer {layer}", found
 
 
@@ -148,7 +148,7 @@ def _check_copies(path: Path, space: Any) -> None:
     """Count what blocks draw, without drawing it.
 
     Raises:
-        MeshError: If it is too much, or a block contains itself.
+        ShapeError: If it is too much, or a block contains itself.
     """
     sizes: dict[str, tuple[int, int]] = {}
 
@@ -162,16 +162,16 @@ def _check_copies(path: Path, space: Any) -> None:
                 continue
             names = (*inside, block.name)
             if block.name in inside:
-                raise MeshError(path, f"block {block.name!r} contains itself: {' > '.join(names)}")
+                raise ShapeError(path, f"block {block.name!r} contains itself: {' > '.join(names)}")
             if block.name not in sizes and len(names) <= _MOST_NESTED:
                 sizes[block.name] = size(block, names)
             copies, below = sizes.get(block.name, (0, _MOST_NESTED))
             if (depth := max(depth, 1 + below)) > _MOST_NESTED:
-                raise MeshError(path, f"block {names[0]!r} is nested deeper than {_MOST_NESTED}")
+                raise ShapeError(path, f"block {names[0]!r} is nested deeper than {_MOST_NESTED}")
             # ezdxf visits every row and column, also without a spacing.
             count += max(entity.dxf.row_count, 1) * max(entity.dxf.column_count, 1) * (1 + copies)
             if count > _MOST_COPIES:
-                raise MeshError(path, f"its blocks draw more than {_MOST_COPIES:,} curves and blocks")
+                raise ShapeError(path, f"its blocks draw more than {_MOST_COPIES:,} curves and blocks")
         return count, depth
 
     size(space, ())
@@ -192,7 +192,7 @@ def _drawn(
             for one in entity.multi_insert() if entity.mcount > 1 else (entity,):
                 inner = np.array(list(one.matrix44())).reshape(4, 4) @ placement
                 if not np.isfinite(inner).all():
-                    raise MeshError(path, f"INSERT {entity.dxf.handle} has a value that is not finite")
+                    raise ShapeError(path, f"INSERT {entity.dxf.handle} has a value that is not finite")
                 yield from _drawn(path, block, inner, own, here)
 
 
@@ -212,15 +212,15 @@ def _flattened(path: Path, entity: Any, tolerance: float) -> FloatArray:
     name = f"{entity.dxftype()} {entity.dxf.handle}"
     # ezdxf halves a curve until the parts are within the tolerance, which never ends for such values.
     if not np.isfinite(corners).all() or not len(corners):
-        raise MeshError(path, f"{name} has a point that is not finite")
+        raise ShapeError(path, f"{name} has a point that is not finite")
     size = float(np.ptp(corners, axis=0).max())
     if size / max(tolerance, 1e-300) > 1e9:
-        raise MeshError(path, f"{name} is {size:.3g} units large: too large for its tolerance")
+        raise ShapeError(path, f"{name} is {size:.3g} units large: too large for its tolerance")
     points = []
     for piece in _pieces(entity, max(tolerance, size * 1e-6)):
         points.append(np.array([(point[0], point[1], point[2]) for point in piece], dtype=np.float64))
         if sum(map(len, points)) > _MOST_POINTS:
-            raise MeshError(path, f"{name} gives more than {_MOST_POINTS} points: use a larger tolerance")
+            raise ShapeError(path, f"{name} gives more than {_MOST_POINTS} points: use a larger tolerance")
     # The arcs of a polyline always run counter-clockwise, even where the polyline runs clockwise.
     return next(_joined(points, near=size * 1e-6))
 

@@ -23,8 +23,8 @@ from robots.schema.units import length_factor
 
 Step = str | int
 
-# Keys of a body that name a mesh file.
-_MESHES = ("mesh", "collision_mesh")
+# Keys of a body that name a shape file.
+_SHAPE_KEYS = ("mesh", "collision_mesh")
 # No arm is that long. A larger number is a typing error, or metres in a file of millimetres.
 _LONGEST_M = 100.0
 
@@ -252,7 +252,7 @@ def file_problems(values: Mapping[str, Any], folder: Path, *, confined: bool) ->
         confined: Reject every path outside the folder without looking for it.
     """
     for place, name in named_files(values):
-        is_mesh = place[-1] in _MESHES
+        is_mesh = place[-1] in _SHAPE_KEYS
         key = f"link {_link_name(values, place)!r} {place[-1]}" if is_mesh else str(place[0])
         path = folder / name
         if "\0" in name:
@@ -284,7 +284,7 @@ def named_files(values: Mapping[str, Any]) -> Iterator[tuple[tuple[Step, ...], s
         if isinstance(row, dict)
     ]
     for place, body in bodies:
-        for key in _MESHES if isinstance(body, dict) else ():
+        for key in _SHAPE_KEYS if isinstance(body, dict) else ():
             if isinstance(body.get(key), str):
                 yield (*place, key), body[key]
     if isinstance(values.get("urdf"), str):

@@ -2,7 +2,7 @@
 
 RobotError
 ├── DescriptionError    a description cannot be used: file, key, value and what would be right
-├── MeshError           a mesh file cannot be read: file, place and what is wrong there
+├── ShapeError           a shape file cannot be read: file, place and what is wrong there
 ├── SaveError           a robot cannot be written to its folder
 │   └── RobotExistsError    a robot of that name exists
 ├── VerificationRecordError a file is no record of a verification
@@ -47,14 +47,14 @@ class DescriptionError(RobotError):
         super().__init__(f"{self.source}: {self.problems[0]}{rest}")
 
 
-class MeshError(RobotError):
-    """A mesh file that cannot be read.
+class ShapeError(RobotError):
+    """A shape file that cannot be read.
 
     Attributes:
         source: The file.
         place: "line 12", "byte 96"; empty for the whole file.
         reason: The fault at this place.
-        missing: A required file that does not exist, as the mesh file names it.
+        missing: A required file that does not exist, as the shape file names it.
     """
 
     def __init__(self, source: str | Path, reason: str, *, place: str = "", missing: str = "") -> None:

@@ -82,15 +82,15 @@ class Pose(_Table):
 
 
 class Body(_Table):
-    """A link's mesh file and colour.
+    """A link's shape file and colour.
 
     Attributes:
         mesh: File, relative to the description's folder; None: the link is not drawn.
         collision_mesh: File that collision checks use in place of `mesh`.
         mesh_scale: Metres per unit of both files.
-        mesh_pose: Pose of both meshes in the link's frame.
+        mesh_pose: Pose of both shapes in the link's frame.
         color: Colour of the materials named "paint", or of all materials if none has this name; None keeps
-            the mesh's colours.
+            the shape's colours.
     """
 
     mesh: str | None = None
@@ -270,7 +270,7 @@ class RobotDescription(_Table):
         home, file_folder = self._source.resolve().parent, file.resolve().parent
         package = next((each for each in (home, *home.parents) if (each / "package.xml").is_file()), home)
         around = Path(os.path.commonpath([package, file_folder]))
-        # A mesh of a package installed elsewhere shares only the root folder with the description.
+        # A shape of a package installed elsewhere shares only the root folder with the description.
         return file_folder if around == Path(around.anchor) else around
 
     def confined_to(self, folder: Path) -> Self:
@@ -304,11 +304,11 @@ class DhDescription(RobotDescription):
         return {BASE_LINK: self.base} | {joint.link_name: joint.link for joint in self.joints}
 
     def mesh_path(self, body: Body) -> Path | None:
-        """Return the path of a body's mesh file; None without one."""
+        """Return the path of a body's shape file; None without one."""
         return self._in_folder(body.mesh)
 
     def collision_path(self, body: Body) -> Path | None:
-        """Return the path of a body's separate collision mesh; None without one."""
+        """Return the path of a body's separate collision shape; None without one."""
         return self._in_folder(body.collision_mesh)
 
     def _in_folder(self, name: str | None) -> Path | None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.shapes.mesh import FloatArray, IndexArray, unit
+from robots.shapes.geometry import FloatArray, IndexArray, unit
 from robots.shapes.normals import corner_keys, crease_normals
 from robots.shapes.polygons import Effort, area_vectors, bent_inwards, ears, fans, starts_of
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.shapes.mesh import FloatArray, IndexArray, unit
+from robots.shapes.geometry import FloatArray, IndexArray, unit
 from robots.shapes.polygons import area_vectors
 
 Split = tuple[FloatArray, FloatArray, IndexArray]

@@ -7,7 +7,7 @@ corners of each polygon, at least three.
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.shapes.mesh import FloatArray, IndexArray
+from robots.shapes.geometry import FloatArray, IndexArray
 
 # Costs in units of sorting one corner: to test a corner for an ear, to test one point inside the ear, and
 # to skip a reflex corner.

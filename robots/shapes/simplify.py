@@ -1,4 +1,4 @@
-"""Reduction of a mesh to a number of triangles that is enough for display."""
+"""Reduction of a shape to a number of triangles that is enough for display."""
 
 import importlib
 from dataclasses import replace
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from robots.shapes.mesh import Mesh, Part, welded
+from robots.shapes.geometry import Geometry, Part, welded
 from robots.shapes.normals import creased
 
 _CREASE = np.radians(30)
@@ -14,12 +14,12 @@ _CREASE = np.radians(30)
 _LEAST = 64
 
 
-def lightened(mesh: Mesh, most: int) -> Mesh:
-    """Return the mesh reduced to about `most` triangles, or unchanged if it has no more."""
-    count = mesh.triangle_count
+def lightened(geometry: Geometry, most: int) -> Geometry:
+    """Return the shape reduced to about `most` triangles, or unchanged if it has no more."""
+    count = geometry.triangle_count
     if count <= most:
-        return mesh
-    return replace(mesh, parts=tuple(_light(part, most / count) for part in mesh.parts))
+        return geometry
+    return replace(geometry, parts=tuple(_light(part, most / count) for part in geometry.parts))
 
 
 def _light(part: Part, kept: float) -> Part:

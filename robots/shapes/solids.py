@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from robots.shapes.mesh import FloatArray, IndexArray, unit
+from robots.shapes.geometry import FloatArray, IndexArray, unit
 
 Solid = tuple[FloatArray, IndexArray]
 Profile = Sequence[tuple[float, float]]

@@ -1,18 +1,18 @@
-"""Points spread evenly over a mesh's surface."""
+"""Points spread evenly over a shape's surface."""
 
 import numpy as np
 
-from robots.shapes.mesh import FloatArray, Mesh
+from robots.shapes.geometry import FloatArray, Geometry
 
 _GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])  # of the R2 sequence: even in the plane
 
 
-def surface_points(mesh: Mesh, count: int) -> FloatArray:
-    """Return points (count, 3) of the triangles, by area, in the mesh's units; (0, 3) if it has none.
+def surface_points(geometry: Geometry, count: int) -> FloatArray:
+    """Return points (count, 3) of the triangles, by area, in the shape's units; (0, 3) if it has none.
 
-    The same mesh has the same points: no random number is drawn.
+    The same shape has the same points: no random number is drawn.
     """
-    corners = [part.vertices[part.triangles] for part in mesh.parts if len(part.triangles)]
+    corners = [part.vertices[part.triangles] for part in geometry.parts if len(part.triangles)]
     if not corners:
         return np.empty((0, 3))
     triangles = np.concatenate(corners)

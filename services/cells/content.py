@@ -55,7 +55,7 @@ def version_of(content: schema.CellContent) -> str:
     return hashlib.sha256(json.dumps(row, sort_keys=True).encode()).hexdigest()
 
 
-def check_limits(content: schema.CellContent, meshes: Sequence[str]) -> None:
+def check_limits(content: schema.CellContent, shapes: Sequence[str]) -> None:
     """Check a client's content against limits that a site file does not have.
 
     Args:
@@ -73,7 +73,7 @@ def check_limits(content: schema.CellContent, meshes: Sequence[str]) -> None:
             raise RefusedError(
                 codes.CELL_TOO_MANY(count=len(message.ignore), what="ignored links", most=MOST_IGNORED)
             )
-        if message.HasField("mesh") and message.mesh.file not in meshes:
+        if message.HasField("mesh") and message.mesh.file not in shapes:
             raise RefusedError(codes.CELL_MESH(name=message.name, file=message.mesh.file))
     for fixture in fixtures_of(content):
         if (problem := _size_problem(fixture)) is not None:

@@ -71,7 +71,7 @@ COMMANDS = {
         'Inverse kinematics of a pose; JSON: {"pose", "task", "near", "all", "seed"} a line in.',
     ),
     "robot": Row("robots.commands", "Robot descriptions: check, show, import, export, verify."),
-    "mesh": Row("robots.mesh", "Mesh files: inspect, convert."),
+    "shapes": Row("robots.shapes", "Files with shapes: inspect, convert."),
     "program": Row("program.commands", "Teach programs: check, plan, from CAD."),
     "programs": Row(
         "program.stored", "Programs stored at a site: list, show, save, restore, diff, export, import."
@@ -89,11 +89,15 @@ COMMANDS = {
 }
 
 
+# Earlier names, valid for one release.
+_RENAMED = {"mesh": "shapes"}
+
+
 class _LazyGroup(TyperGroup):
     """A command group with a placeholder for each row: enough for help and for suggestions."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[str | None, Any, list[str]]:
-        name, _, rest = super().resolve_command(ctx, args)
+        name, _, rest = super().resolve_command(ctx, [_RENAMED.get(args[0], args[0]), *args[1:]])
         return name, None if name is None else load(name), rest
 
     def get_help_option(self, ctx: Any) -> Any:

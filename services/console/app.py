@@ -42,11 +42,11 @@ from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
 from services.console.http import png
 from services.console.http.layouts import layout_response
-from services.console.http.meshes import MeshCache, mesh_response
 from services.console.http.page_files import PageFiles
 from services.console.http.pictures import MJPEG, Pictures
 from services.console.http.recorded_video import RecordedVideo
 from services.console.http.recordings import Recordings
+from services.console.http.shapes import ShapeCache, shape_response
 from services.console.http.view_page import ViewPage
 from services.console.serving.listener import listening
 from services.console.serving.uvicorn_server import (
@@ -148,7 +148,7 @@ class Hub:
     ) -> None:
         self.session = session
         self.settings = settings
-        self.meshes = MeshCache()
+        self.shapes = ShapeCache()
         self.subscriptions = SharedSubscriptions(session)
         self.views = Views(session)
         self.recorded_video = RecordedVideo(session, self.asker)
@@ -328,7 +328,7 @@ def application(hub: Hub) -> ASGIApp:
     account = AccountRoutes(hub.auth, site=settings.site, cookie=cookie, secure=secure, insecure=hub.exposed)
 
     async def mesh(request: Request) -> Response:
-        return await mesh_response(request, hub.session, hub.meshes)
+        return await shape_response(request, hub.session, hub.shapes)
 
     async def layout(request: Request) -> Response:
         return await layout_response(request, hub.session)

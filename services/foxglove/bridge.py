@@ -18,7 +18,7 @@ from services.foxglove.settings import Settings
 
 log = logging.getLogger(__name__)
 
-_MESH_TIMEOUT_S = 10.0
+_SHAPE_TIMEOUT_S = 10.0
 # Queue size of a slow client, about a second of states; beyond it the oldest messages are dropped.
 _BACKLOG = 256
 
@@ -116,11 +116,11 @@ class Bridge:
 
     def _asset(self, uri: str) -> bytes | None:
         """Return a file that a description names; called on a thread of the SDK."""
-        return asyncio.run_coroutine_threadsafe(self._mesh(uri), self._loop).result()
+        return asyncio.run_coroutine_threadsafe(self._shape(uri), self._loop).result()
 
-    async def _mesh(self, uri: str) -> bytes | None:
+    async def _shape(self, uri: str) -> bytes | None:
         key = self.channels.asset_key(uri)
-        return None if key is None else await self.session.ask_bytes(key, timeout_s=_MESH_TIMEOUT_S)
+        return None if key is None else await self.session.ask_bytes(key, timeout_s=_SHAPE_TIMEOUT_S)
 
 
 class _SubscriptionListener(ServerListener):

@@ -14,7 +14,7 @@ from robomesh.wire.session import Session
 from robots.descriptions.urdf.viewers import together
 from services.foxglove.channel_subscriptions import LatchedChannel, TopicChannel
 from services.foxglove.messages import TEXT_SCHEMA, log_of, protobuf_schema, text_message
-from services.viewers.robots import meshes_of, viewer_robot
+from services.viewers.robots import shapes_of, viewer_robot
 
 log = logging.getLogger(__name__)
 
@@ -127,11 +127,11 @@ class Channels:
         parts = uri.removeprefix(_ASSETS).removesuffix(".glb").split("/")
         if not uri.startswith(_ASSETS) or len(parts) != 3:
             return None
-        site, robot, mesh = parts
+        site, robot, shape = parts
         description = self._described.get((site, robot))
-        if description is None or mesh not in meshes_of(description):
+        if description is None or shape not in shapes_of(description):
             return None
-        return robot_key(site, robot, f"mesh/{mesh}")
+        return robot_key(site, robot, f"mesh/{shape}")
 
     def close(self) -> None:
         """Remove all channels."""

@@ -1,4 +1,4 @@
-"""Request handlers of one arm: meshes and forward in-process, inverse and check in worker processes."""
+"""Request handlers of one arm: shapes and forward in-process, inverse and check in worker processes."""
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
@@ -58,7 +58,7 @@ def answer_robot_requests(
     robot: str,
     *,
     model: RobotModel,
-    meshes: Callable[[], Mapping[str, bytes]],
+    shapes: Callable[[], Mapping[str, bytes]],
     cell_state: CellState,
     workers: Workers,
     checks: Quota,
@@ -71,11 +71,11 @@ def answer_robot_requests(
         checks: Check quota of each client, over all arms because one process serves them.
     """
 
-    async def answer_mesh(request: Request) -> bytes:
-        glbs = meshes()
+    async def answer_shape(request: Request) -> bytes:
+        glbs = shapes()
         if request.chunk not in glbs:
             available = ", ".join(glbs) or "none"
-            raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, meshes=available))
+            raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, shapes=available))
         return glbs[request.chunk]
 
     async def answer_forward(request: Request) -> schema.ForwardAnswer:
@@ -104,7 +104,7 @@ def answer_robot_requests(
         with checks.in_progress(request.asker):
             return schema.CheckAnswer.FromString(await _ask_worker(workers.check, question, _CHECK_S))
 
-    session.answer(site, robot, "mesh/*", answer_mesh)
+    session.answer(site, robot, "mesh/*", answer_shape)
     session.answer(site, robot, "kinematics/forward", answer_forward)
     session.answer(site, robot, "kinematics/inverse", answer_inverse)
     session.answer(site, robot, "kinematics/check/*", answer_check)

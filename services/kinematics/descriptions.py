@@ -20,7 +20,7 @@ _TYPES = {
 
 
 @dataclass(frozen=True, eq=False)
-class FixtureMesh:
+class FixtureShape:
     """A fixture with its shape as GLB."""
 
     fixture: Fixture
@@ -32,20 +32,20 @@ class FixtureMesh:
         return f"fixture.{self.fixture.name}"
 
 
-def fixture_meshes(cell: CellDescription) -> tuple[FixtureMesh, ...]:
-    """Return a cell's fixtures with their meshes.
+def fixture_shapes(cell: CellDescription) -> tuple[FixtureShape, ...]:
+    """Return a cell's fixtures with their shapes.
 
     Raises:
-        MeshError: If a mesh file cannot be read.
+        ShapeError: If a shape file cannot be read.
     """
-    return tuple(FixtureMesh(fixture, shapes_glb(fixture.shapes)) for fixture in cell.fixtures)
+    return tuple(FixtureShape(fixture, shapes_glb(fixture.shapes)) for fixture in cell.fixtures)
 
 
 def describe(
     description: RobotDescription,
     *,
     urdf: str,
-    meshes: Mapping[str, bytes],
+    shapes: Mapping[str, bytes],
     base_to_site: FloatArray,
     cell: str,
     simulated: bool,
@@ -69,7 +69,7 @@ def describe(
         simulated=simulated,
     )
     _add_joints(message, description)
-    _add_links(message, description, meshes)
+    _add_links(message, description, shapes)
     _add_frames(message, description)
     _add_views(message, description)
     return message
@@ -79,7 +79,7 @@ def add_surroundings(
     message: schema.Description,
     robot: CellRobot,
     cell: CellDescription,
-    fixtures: Sequence[FixtureMesh],
+    fixtures: Sequence[FixtureShape],
     version: str = "",
 ) -> None:
     """Add the fixtures, the floor and the clearance distances of a robot's cell.
@@ -135,10 +135,10 @@ def _add_joints(message: schema.Description, description: RobotDescription) -> N
 
 
 def _add_links(
-    message: schema.Description, description: RobotDescription, meshes: Mapping[str, bytes]
+    message: schema.Description, description: RobotDescription, shapes: Mapping[str, bytes]
 ) -> None:
     for link in tree_of(description).links:
-        glb = meshes.get(link.name)
+        glb = shapes.get(link.name)
         colors = {shape.color for shape in link.shapes if shape.color is not None}
         message.links.add(
             name=link.name,

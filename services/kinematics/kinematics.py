@@ -11,7 +11,7 @@ from robomesh.files.worker import Worker
 from robomesh.wire.session import Session
 from robots.descriptions.cells import CellDescription
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_meshes, main_colors
+from robots.descriptions.glb import link_glbs, main_colors
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.model import build_model
 from robots.kinematics.singularity import reach_of
@@ -97,25 +97,25 @@ async def _serve_robot(
     (robot,) = (each for each in settings.cell_description.robots if each.name == settings.name)
     description = load(robot.model, confined=robot.confined)
     model = build_model(description)
-    meshes = await asyncio.to_thread(link_meshes, description)
+    shapes = await asyncio.to_thread(link_glbs, description)
     answer_robot_requests(
         session,
         site,
         robot.name,
         model=model,
-        meshes=lambda: meshes | shown.now.meshes,
+        shapes=lambda: shapes | shown.now.shapes,
         cell_state=cell_state,
         workers=workers,
         checks=checks,
     )
-    urdf = to_urdf(description, colors=main_colors(meshes))
+    urdf = to_urdf(description, colors=main_colors(shapes))
     publisher = session.declare_publisher(site, robot.name, "description")
 
     def publish_description() -> None:
         message = describe(
             description,
             urdf=urdf,
-            meshes=meshes,
+            shapes=shapes,
             base_to_site=robot.base_to_site,
             cell=settings.cell,
             simulated=settings.simulated,

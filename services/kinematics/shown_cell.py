@@ -24,7 +24,7 @@ from robots.descriptions.cells import CellDescription
 from robots.kinematics.joints import FloatArray
 from robots.schema.errors import RobotError, reason_of
 from services.kinematics.answers import Workers
-from services.kinematics.descriptions import FixtureMesh, fixture_meshes
+from services.kinematics.descriptions import FixtureShape, fixture_shapes
 from services.kinematics.settings import CellContents
 
 log = logging.getLogger(__name__)
@@ -43,11 +43,11 @@ class Shown:
 
     version: str
     description: CellDescription
-    fixtures: tuple[FixtureMesh, ...]
+    fixtures: tuple[FixtureShape, ...]
     built: Cell | None = None
 
     @property
-    def meshes(self) -> dict[str, bytes]:
+    def shapes(self) -> dict[str, bytes]:
         """GLB of each fixture by the last chunk of its key."""
         return {each.name: each.glb for each in self.fixtures}
 
@@ -66,7 +66,7 @@ def first_content(description: CellDescription, contents: CellContents | None) -
     version, robot = "", description.robots[0].name
     if contents is not None:
         version, _ = contents.describe(robot, contents.content(robot))
-    return Shown(version=version, description=description, fixtures=fixture_meshes(description))
+    return Shown(version=version, description=description, fixtures=fixture_shapes(description))
 
 
 class ShownCell:
@@ -158,7 +158,7 @@ class ShownCell:
         return Shown(
             version=version,
             description=description,
-            fixtures=fixture_meshes(description),
+            fixtures=fixture_shapes(description),
             built=build_cell(description),
         )
 

@@ -39,7 +39,7 @@ _MAX_BEHIND_S = 1.0
 _SLOW_HZ = 10.0
 # A shorter recording is not looped, and no loop restarts more often.
 _MIN_LOOP_S, _LOOP_EACH_S = 0.1, 0.5
-_MESH_TIMEOUT_S = 5.0
+_SHAPE_TIMEOUT_S = 5.0
 
 
 @dataclass
@@ -158,15 +158,15 @@ class Replay:
         try:
             return await asyncio.to_thread(self._source.file.attachment, f"mesh/{request.chunk}")
         except RecordingError as error:
-            return await self._mesh_of_robot(request.chunk, error.reason)
+            return await self._shape_of_robot(request.chunk, error.reason)
 
-    async def _mesh_of_robot(self, name: str, missing: Reason) -> bytes:
-        """Fetch a mesh from the recorded robot, if it is online: old recordings contain no meshes."""
+    async def _shape_of_robot(self, name: str, missing: Reason) -> bytes:
+        """Fetch a shape from the recorded robot, if it is online: old recordings contain no shapes."""
         of = (self._source.of_site, self._source.of_robot)
         with contextlib.suppress(RobomeshError):
             if any((each.site, each.robot) == of for each in await self._session.present()):
                 return await self._session.ask_bytes(
-                    robot_key(*of, f"mesh/{name}"), timeout_s=_MESH_TIMEOUT_S
+                    robot_key(*of, f"mesh/{name}"), timeout_s=_SHAPE_TIMEOUT_S
                 )
         raise RefusedError(missing)
 

@@ -1,4 +1,4 @@
-"""Attachments of a recording: the robot's description and meshes, a picture, the site file."""
+"""Attachments of a recording: the robot's description and shapes, a picture, the site file."""
 
 import asyncio
 import base64
@@ -15,7 +15,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
 from robots.descriptions.urdf.viewers import prefixed, without_joints
 
-_MESH_WITHIN_S = 10.0
+_SHAPE_WITHIN_S = 10.0
 _PICTURE_WITHIN_S = 5.0
 _PICTURES = (CLOSE, FAR)
 # Keys of the site file with secret values.
@@ -34,7 +34,7 @@ class Attachment:
 
 @dataclass(frozen=True)
 class KnownRobot:
-    """A robot's description and meshes.
+    """A robot's description and shapes.
 
     Attributes:
         header: Header of its description.
@@ -43,13 +43,13 @@ class KnownRobot:
 
     header: Header
     description: schema.Description
-    meshes: dict[str, bytes]
+    shapes: dict[str, bytes]
     prefix: str
 
     @property
     def attachments(self) -> list[Attachment]:
         """Attachments of each file of the robot."""
-        found = [Attachment(f"mesh/{name}", "model/gltf-binary", data) for name, data in self.meshes.items()]
+        found = [Attachment(f"mesh/{name}", "model/gltf-binary", data) for name, data in self.shapes.items()]
         if self.description.robot_toml:
             found.append(Attachment("robot.toml", "application/toml", self.description.robot_toml.encode()))
         if self.description.urdf:
@@ -63,7 +63,7 @@ def without_secrets(site_file: str) -> str:
 
 
 class DescriptionCache:
-    """Descriptions and meshes of a site's robots, kept up to date so that a new recording starts with them.
+    """Descriptions and shapes of a site's robots, kept up to date so that a new recording starts with them.
 
     Args:
         on_known: Called with a robot's name when its description is complete or has changed.
@@ -74,8 +74,8 @@ class DescriptionCache:
         self._session, self._site = session, site
         self._on_known = on_known
         self._tasks: dict[str, asyncio.Task[None]] = {}
-        # By content hash: robots of one model share their meshes.
-        self._meshes: dict[str, bytes] = {}
+        # By content hash: robots of one model share their shapes.
+        self._shapes: dict[str, bytes] = {}
 
     async def serve(self) -> None:
         """Receive descriptions until cancelled."""
@@ -89,30 +89,30 @@ class DescriptionCache:
                     continue
                 assert isinstance(description, schema.Description)
                 if not description.HasField("replay"):
-                    task = group.create_task(self._fetch_meshes(robot, sample.header, description))
+                    task = group.create_task(self._fetch_shapes(robot, sample.header, description))
                     self._tasks[robot] = task
 
-    async def wait_for_meshes(self, robot: str, *, within_s: float) -> None:
-        """Wait for meshes that are being fetched, at most this long."""
+    async def wait_for_shapes(self, robot: str, *, within_s: float) -> None:
+        """Wait for shapes that are being fetched, at most this long."""
         if (task := self._tasks.get(robot)) is not None:
             await asyncio.wait([task], timeout=within_s)
 
-    async def _fetch_meshes(self, robot: str, header: Header, description: schema.Description) -> None:
-        meshes: dict[str, bytes] = {}
+    async def _fetch_shapes(self, robot: str, header: Header, description: schema.Description) -> None:
+        shapes: dict[str, bytes] = {}
         hashes = {each.mesh: each.mesh_sha256 for each in description.links}
         hashes |= {each.mesh: each.mesh_sha256 for each in description.fixtures}
         for name, sha256 in hashes.items():
             if not name:
                 continue
-            if (data := self._meshes.get(sha256)) is None:
+            if (data := self._shapes.get(sha256)) is None:
                 try:
                     key = robot_key(self._site, robot, f"mesh/{name}")
-                    data = await self._session.ask_bytes(key, timeout_s=_MESH_WITHIN_S)
+                    data = await self._session.ask_bytes(key, timeout_s=_SHAPE_WITHIN_S)
                 except RobomeshError:
                     continue  # the description still holds its name and hash
-                self._meshes[sha256] = data
-            meshes[name] = data
-        self.known[robot] = KnownRobot(header, description, meshes, prefix=f"{self._site}/{robot}/")
+                self._shapes[sha256] = data
+            shapes[name] = data
+        self.known[robot] = KnownRobot(header, description, shapes, prefix=f"{self._site}/{robot}/")
         self._on_known(robot)
 
 
@@ -137,10 +137,10 @@ def self_contained_urdf(robot: KnownRobot) -> str:
     A viewer that opens the file has no other source of meshes. The whole URDF is an attachment.
     """
     description = robot.description
-    mesh_of = {link.name: robot.meshes.get(link.mesh) for link in description.links}
+    shape_of = {link.name: robot.shapes.get(link.mesh) for link in description.links}
 
     def uri(link: str) -> str | None:
-        data = mesh_of.get(link)
+        data = shape_of.get(link)
         return f"data:model/gltf-binary;base64,{base64.b64encode(data).decode()}" if data else None
 
     try:

@@ -39,7 +39,7 @@ log = logging.getLogger(__name__)
 
 _TICK_S = 0.1
 _BEATS = 10  # ticks
-_MESHES_WITHIN_S = 1.0
+_SHAPES_WITHIN_S = 1.0
 _REFRESH_AFTER_S = (0.1, 2.0)
 _LOCK_RETRY_S = 2.0
 _MAX_ENDED = 100
@@ -102,7 +102,7 @@ class _Robot:
 
     async def close(self) -> schema.Recording:
         """End the capture with its attachments."""
-        await self.recorder.descriptions.wait_for_meshes(self.name, within_s=_MESHES_WITHIN_S)
+        await self.recorder.descriptions.wait_for_shapes(self.name, within_s=_SHAPES_WITHIN_S)
         return await self.captures.close()
 
     async def on_trace(self, state: _State, previous: int) -> None:

@@ -17,8 +17,8 @@ from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.wire.session import Session
 from robots.descriptions.urdf.viewers import WORLD, Viewed, together
-from services.ros2.meshes import Meshes
 from services.ros2.settings import Settings
+from services.ros2.shapes import ShapeFiles
 from services.ros2.wire import Node, Topic, message
 from services.viewers.robots import viewer_robot
 
@@ -45,7 +45,7 @@ class Bridge:
         self._tf = self._node.publish(TF)
         self._tf_static = self._node.publish(TF_STATIC)
         self._description = self._node.publish(ROBOT_DESCRIPTION)
-        self._meshes = Meshes(session, settings.meshes)
+        self._shapes = ShapeFiles(session, settings.shapes)
         self._described: dict[tuple[str, str], Viewed] = {}
         self._published_text = ""
         self._invalid_keys: set[str] = set()
@@ -115,7 +115,7 @@ class Bridge:
                 continue
             assert isinstance(description, Description)
             if description.urdf:
-                uris = await self._meshes.of(site, robot, description)
+                uris = await self._shapes.of(site, robot, description)
                 self._described[site, robot] = viewer_robot(site, robot, description, uris.get)
                 self._publish_description()
 

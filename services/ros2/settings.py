@@ -29,7 +29,7 @@ class Settings:
     site: str = ""
     metrics: tuple[str, int] | None = None
     node: str = "robomesh"
-    meshes: Path = field(default_factory=_cache)
+    shapes: Path = field(default_factory=_cache)
 
     def wants(self, site: str, robot: str) -> bool:
         """Return whether to publish a robot to ROS 2; replays only if the settings name them."""

@@ -16,7 +16,7 @@ from google.protobuf.json_format import MessageToDict, ParseDict, ParseError
 
 from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import ProgramVersion
-from services.store.history import Program, sha256
+from services.store.history import ProgramHistory, sha256
 
 _RUNS = "runs"
 _ENDING = ".json"
@@ -36,7 +36,7 @@ class ProgramFiles:
     def __init__(self, folder: Path) -> None:
         self._folder, self._texts = folder, folder / "texts"
 
-    def programs(self) -> Iterator[Program | DamagedError]:
+    def programs(self) -> Iterator[ProgramHistory | DamagedError]:
         """Read all programs; a damaged file is renamed, so that nothing overwrites it."""
         for path in sorted(self._folder.glob(f"*{_ENDING}")):
             if path.stem != _RUNS:
@@ -50,7 +50,7 @@ class ProgramFiles:
         except DamagedError as error:
             return self._set_aside(path, error)
 
-    def _program(self, path: Path) -> Program | DamagedError:
+    def _program(self, path: Path) -> ProgramHistory | DamagedError:
         try:
             versions = tuple(_versions(path))
             numbers = [each.number for each in versions]
@@ -58,7 +58,7 @@ class ProgramFiles:
                 raise DamagedError(f"{path}: its versions are not numbered from 1")
             if versions[0].change == ProgramVersion.ASIDE:
                 raise DamagedError(f"{path}: it begins with a version that was put aside")
-            return Program(path.stem, versions)
+            return ProgramHistory(path.stem, versions)
         except DamagedError as error:
             return self._set_aside(path, error)
 
@@ -66,7 +66,7 @@ class ProgramFiles:
         path.replace(path.with_suffix(_DAMAGED))
         return error
 
-    def write_program(self, program: Program, text: str | None) -> None:
+    def write_program(self, program: ProgramHistory, text: str | None) -> None:
         """Write a program whose newest version is new.
 
         Args:

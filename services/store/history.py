@@ -24,7 +24,7 @@ _LONGEST_REASON = 500
 
 
 @dataclass(frozen=True, slots=True)
-class Program:
+class ProgramHistory:
     """A program and all its versions, oldest first; a new one has none yet."""
 
     id: str
@@ -58,7 +58,7 @@ class Program:
             raise RefusedError(codes.PROGRAMS_VERSION(name=self.current.name, version=number, newest=newest))
         return self.versions[number - 1]
 
-    def with_version(self, version: ProgramVersion) -> "Program":
+    def with_version(self, version: ProgramVersion) -> "ProgramHistory":
         """Return the program with a version that `changed` made."""
         return replace(self, versions=(*self.versions, version))
 
@@ -93,7 +93,7 @@ def check_text(text: str) -> str:
     return text
 
 
-def changed(program: Program, asked: ProgramRequest, author: str, at_ns: int) -> ProgramVersion:
+def changed(program: ProgramHistory, asked: ProgramRequest, author: str, at_ns: int) -> ProgramVersion:
     """Return the version that a request adds; an existing one if there is nothing to add.
 
     A text that was written on an older version than the current one is put aside, so that neither author
@@ -133,7 +133,7 @@ def changed(program: Program, asked: ProgramRequest, author: str, at_ns: int) ->
     return new
 
 
-def _change_otherwise(program: Program, asked: ProgramRequest, new: ProgramVersion) -> None:
+def _change_otherwise(program: ProgramHistory, asked: ProgramRequest, new: ProgramVersion) -> None:
     """Complete the version that renames, deletes or restores a program."""
     match asked.action:
         case ProgramRequest.RENAME:
@@ -166,6 +166,6 @@ def name_key(name: str) -> str:
     return unicodedata.normalize("NFC", name.casefold())
 
 
-def sorted_by_name(programs: Iterable[Program]) -> list[Program]:
+def sorted_by_name(programs: Iterable[ProgramHistory]) -> list[ProgramHistory]:
     """Return programs in the order of their names."""
     return sorted(programs, key=lambda each: (name_key(each.current.name), each.id))

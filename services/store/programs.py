@@ -23,7 +23,7 @@ from robomesh.schemas.robomesh_pb2 import (
     ProgramVersion,
 )
 from services.store.files import DamagedError, ProgramFiles
-from services.store.history import Program, changed, check_text, name_key, sha256, sorted_by_name
+from services.store.history import ProgramHistory, changed, check_text, name_key, sha256, sorted_by_name
 from services.store.settings import MIB
 
 MOST_PROGRAMS = 500
@@ -38,7 +38,7 @@ class _Robot:
     """Programs of one robot; `texts` are the saved versions' texts, by hash, with their bytes."""
 
     files: ProgramFiles
-    programs: dict[str, Program] = field(default_factory=dict)
+    programs: dict[str, ProgramHistory] = field(default_factory=dict)
     runs: tuple[ProgramVersion, ...] = ()
     texts: dict[str, int] = field(default_factory=dict)
 
@@ -122,7 +122,7 @@ class ProgramStore:
         if asked.id or asked.action != ProgramRequest.SAVE:
             program = self._program(asked.robot, asked.id)
         else:
-            program = Program(secrets.token_hex(8))
+            program = ProgramHistory(secrets.token_hex(8))
             if len(robot.programs) >= MOST_PROGRAMS:
                 raise RefusedError(codes.PROGRAMS_TOO_MANY(robot=asked.robot, most=MOST_PROGRAMS))
         version = changed(program, asked, author, at_ns)
@@ -197,7 +197,7 @@ class ProgramStore:
             raise RefusedError(codes.PROGRAMS_ROBOT(site=self._folder.name, robot=name))
         return self._robots[name]
 
-    def _program(self, robot: str, id_: str) -> Program:
+    def _program(self, robot: str, id_: str) -> ProgramHistory:
         program = self._robot(robot).programs.get(id_)
         if program is None:
             raise RefusedError(codes.PROGRAMS_UNKNOWN(robot=robot, id=id_ or "without an id"))
@@ -254,7 +254,7 @@ def _by_hash(robot: _Robot, hash_: str) -> ProgramContent | None:
     return None if run is None else ProgramContent(version=run)
 
 
-def _content(program: Program, version: ProgramVersion) -> ProgramContent:
+def _content(program: ProgramHistory, version: ProgramVersion) -> ProgramContent:
     return ProgramContent(program=program.message, versions=program.versions, version=version)
 
 

@@ -10,7 +10,7 @@ from robots.descriptions.urdf.viewers import Fixture, Viewed
 _FIXTURE_COLOR = "#6f7c88"
 
 
-def meshes_of(description: Description) -> dict[str, str]:
+def shapes_of(description: Description) -> dict[str, str]:
     """Return the hash (SHA-256, hex) of each mesh of a description, by the mesh's name."""
     hashes = {link.mesh: link.mesh_sha256 for link in description.links}
     hashes |= {fixture.mesh: fixture.mesh_sha256 for fixture in description.fixtures}
@@ -24,7 +24,7 @@ def viewer_robot(site: str, robot: str, description: Description, uri: Callable[
     Args:
         uri: Returns the URI of a mesh by its name, or None if the viewer cannot get it.
     """
-    mesh_of = {link.name: link.mesh for link in description.links}
+    shape_of = {link.name: link.mesh for link in description.links}
     fixtures = (
         Fixture(
             each.name, tuple(each.fixture_to_site), uri(each.mesh) if each.mesh else None, _rgba(each.color)
@@ -36,7 +36,7 @@ def viewer_robot(site: str, robot: str, description: Description, uri: Callable[
         robot,
         description.urdf,
         tuple(description.base_to_site),
-        lambda link: uri(mesh) if (mesh := mesh_of.get(link)) else None,
+        lambda link: uri(shape) if (shape := shape_of.get(link)) else None,
         tuple(fixtures),
         floor_of(description),
     )

@@ -25,7 +25,7 @@ from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_meshes
+from robots.descriptions.glb import link_glbs
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.joints import Joints
 from robots.kinematics.model import build_model
@@ -98,18 +98,18 @@ async def publish(session: Session, names: Sequence[str], states: dict[str, set[
     """
     description = load("pt600")
     model = build_model(description)
-    meshes = link_meshes(description)
+    shapes = link_glbs(description)
     about = describe(
         description,
         urdf=to_urdf(description),
-        meshes=meshes,
+        shapes=shapes,
         base_to_site=np.eye(4),
         cell="a",
         simulated=True,
     )
 
     async def mesh(request: Request) -> bytes:
-        return meshes[request.chunk]
+        return shapes[request.chunk]
 
     publishers = {}
     for name in names:

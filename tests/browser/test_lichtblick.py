@@ -21,7 +21,7 @@ import pytest
 
 import robomesh
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_mesh
+from robots.descriptions.glb import link_geometry
 from robots.kinematics.kinematic_tree import tree_of
 from robots.kinematics.model import build_model, link_placements
 from services.viewers.layout import viewer_layout
@@ -140,7 +140,7 @@ def recorded(site, files):
 
 
 @pytest.mark.parametrize("source", [live, recorded])
-def test_the_arm_has_the_silhouette_of_its_meshes_and_its_colours(site, files, source, tmp_path):
+def test_the_arm_has_the_silhouette_of_its_shapes_and_its_colours(site, files, source, tmp_path):
     from playwright.sync_api import sync_playwright
 
     bridge, parameters = source(site, files)
@@ -202,7 +202,7 @@ def silhouette(site, height, width):
     for link in tree_of(description).links:
         if not link.shapes:
             continue
-        for part in link_mesh(link.shapes).parts:
+        for part in link_geometry(link.shapes).parts:
             world = part.vertices @ placements[link.name][:3, :3].T + placements[link.name][:3, 3]
             x, y, z = ((world - eye) @ camera.T).T
             pixels = np.stack([width / 2 - scale * x / z, height / 2 + scale * y / z], axis=1)

@@ -26,14 +26,14 @@ import numpy as np
 
 from robots.descriptions.description import LIBRARY, parse
 from robots.schema.errors import RobotError
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 from robots.shapes.files.three_ds.read import read_3ds
 from robots.shapes.files.three_ds.write import write_3ds
 from robots.shapes.files.vrml.read import read_vrml
 from robots.shapes.files.vrml.write import write_vrml
 from robots.shapes.files.write_glb import glb_of
 from robots.shapes.files.write_others import write_obj, write_ply, write_stl
-from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.geometry import Geometry, Material, Part
 from robots.shapes.normals import creased
 from robots.shapes.solids import box
 from tests.fuzz.fuzzing import Finding, keep, options
@@ -238,9 +238,9 @@ def _read_toml(path: Path) -> object:
     return parse(text, LIBRARY / "pt600" / "robot.toml")
 
 
-def _box() -> Mesh:
+def _box() -> Geometry:
     material = Material("glass", (0.2, 0.4, 0.6), transparency=0.25)
-    return Mesh((Part("box", material, *creased(*box(np.zeros(3), np.ones(3)), 0.0)),))
+    return Geometry((Part("box", material, *creased(*box(np.zeros(3), np.ones(3)), 0.0)),))
 
 
 @dataclass(frozen=True)
@@ -255,12 +255,12 @@ READERS: Mapping[str, Reader] = {
     "3ds": Reader(read_3ds, _three_ds_corpus),
     "wrl": Reader(read_vrml, _vrml_corpus),
     "toml": Reader(_read_toml, _toml_corpus),
-    "glb": Reader(read_mesh, lambda: iter([glb_of(_box())])),
+    "glb": Reader(read_geometry, lambda: iter([glb_of(_box())])),
     # Other people's readers behind ours.
-    "stl": Reader(read_mesh, lambda: iter([write_stl(_box()), _STL])),
-    "obj": Reader(read_mesh, lambda: iter([write_obj(_box(), "none.mtl")[0].encode()])),
-    "ply": Reader(read_mesh, lambda: iter([write_ply(_box()), _PLY])),
-    "dxf": Reader(read_mesh, lambda: iter([_DXF])),
+    "stl": Reader(read_geometry, lambda: iter([write_stl(_box()), _STL])),
+    "obj": Reader(read_geometry, lambda: iter([write_obj(_box(), "none.mtl")[0].encode()])),
+    "ply": Reader(read_geometry, lambda: iter([write_ply(_box()), _PLY])),
+    "dxf": Reader(read_geometry, lambda: iter([_DXF])),
 }
 
 _STL = b"""solid a

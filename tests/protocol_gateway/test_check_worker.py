@@ -18,7 +18,7 @@ from robomesh import reason_codes as codes
 from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.robot_toml import JointSettings, StatedModel
-from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.geometry import Geometry, Material, Part
 from tests.conftest import run
 from tests.robots.boxes import bar_arm, block, one_joint_arm, placed
 
@@ -122,7 +122,7 @@ def test_a_worker_that_is_killed_while_idle_is_prepared_again_before_the_next_mo
 def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
     faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]])
-    shape = Shape(Mesh(parts=(Part("", Material(), corners, np.zeros_like(corners), faces),)), np.eye(4))
+    shape = Shape(Geometry(parts=(Part("", Material(), corners, np.zeros_like(corners), faces),)), np.eye(4))
     model = bar_arm(tmp_path)
 
     async def main():

@@ -34,16 +34,16 @@ Picture = np.ndarray
 
 def free(folder, *, shading="fast", size=SMALL, near=False, change=lambda scene: scene):
     """Draw a Puma 560 from the front right."""
-    appearance, meshes = robot("puma560", folder)
+    appearance, shapes = robot("puma560", folder)
     scene = change(scene_of(Placed(appearance, placements_at(appearance, posed(appearance)))))
-    return _drawn(meshes, scene, camera_of(appearance, "free"), size, shading, near=near)
+    return _drawn(shapes, scene, camera_of(appearance, "free"), size, shading, near=near)
 
 
 def front(folder, *, size=SMALL):
     """Draw a Pt600 from the front with an orthographic camera."""
-    appearance, meshes = robot("pt600", folder)
+    appearance, shapes = robot("pt600", folder)
     scene = scene_of(Placed(appearance, placements_at(appearance, posed(appearance))))
-    return _drawn(meshes, scene, camera_of(appearance, "front"), size, "fast")
+    return _drawn(shapes, scene, camera_of(appearance, "front"), size, "fast")
 
 
 def full(folder, *, size=SMALL):
@@ -91,7 +91,7 @@ STORED: dict[str, Callable[..., Picture]] = {
 
 
 def _cell(folder, size, *, shading="fast", touching=(), view=None, **shown):
-    appearances, meshes = cell(CELL, folder)
+    appearances, shapes = cell(CELL, folder)
     left, right = appearances["left"], appearances["right"]
     placed = placements_at(left, posed(left))
     scene = scene_of(
@@ -103,11 +103,11 @@ def _cell(folder, size, *, shading="fast", touching=(), view=None, **shown):
         view = View(eye=Vector3(x=2.6, y=-2.6, z=1.5), target=Vector3(x=0.0, y=-0.35, z=0.35))
     view.field_of_view = 0.55
     camera = camera_from(left, view, placed, aspect=size[0] / size[1])
-    return _drawn(meshes, scene, camera, size, shading)
+    return _drawn(shapes, scene, camera, size, shading)
 
 
-def _drawn(meshes, scene, camera, size, shading, *, near=False):
-    drawing = drawing_of(meshes, size, shading=shading)
+def _drawn(shapes, scene, camera, size, shading, *, near=False):
+    drawing = drawing_of(shapes, size, shading=shading)
     if near:
         camera = fitted(camera, size[0] / size[1], drawing.corners(scene), margin=1.3)
     try:

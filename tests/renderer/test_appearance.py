@@ -24,7 +24,7 @@ def described(name, base_to_site=None):
     message = describe(
         description,
         urdf=to_urdf(description),
-        meshes={},
+        shapes={},
         base_to_site=np.eye(4) if base_to_site is None else base_to_site,
         cell="",
         simulated=True,

@@ -137,7 +137,7 @@ def test_bodies_next_to_the_camera_or_out_of_sight_are_harmless(drawing):
     assert not is_red(picture[90, 160])
 
 
-def test_a_released_or_unknown_mesh_is_not_drawn(drawing):
+def test_a_released_or_unknown_shape_is_not_drawn(drawing):
     drawing.add("passing", prepared(cube(0.1, color=RED)))
     drawing.forget(["passing"])
     picture = drawing.draw(scene(Part("passing", at(0, 0, 0.2)), Part("never", at(0, 0, 0.2))), FRONT)

@@ -85,7 +85,7 @@ def test_a_picture_shows_the_age_of_each_robot_of_the_cell():
     one, other = robot("one", cell="a"), robot("other", cell="a")
     message, _ = described("pt600")
     for link in message.links:
-        link.mesh = link.name  # `described` gives no meshes
+        link.mesh = link.name  # `described` gives no shapes
     one.appearance = other.appearance = appearance_of(message)
     old = Ages(frames=9.0, joints=9.0, controller=9.0)
     spec = standard_view("front", size=(640, 360), fps=30.0)

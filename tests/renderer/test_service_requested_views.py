@@ -167,7 +167,7 @@ def test_a_replay_is_drawn_and_removed_with_its_player(mesh, tmp_path, monkeypat
             async with asyncio.timeout(40):
                 while await monitor.last(f"{replay}/image/front", timeout_s=0.5) is not None:
                     pass
-            # The live robot, which has the same meshes, remains.
+            # The live robot, which has the same shapes, remains.
             await picture(monitor)
 
     run(main())

@@ -56,10 +56,10 @@ def test_corners_keep_the_values_of_their_own_side_of_an_edge():
 
 
 def test_a_balls_levels_stay_within_their_errors():
-    mesh = prepared(ball(0.3, rings=60, sectors=80))
-    assert len(mesh.errors) > 2
-    for (first, end), error in zip(pairwise(mesh.levels.tolist()), mesh.errors.tolist(), strict=True):
-        corners = mesh.positions[mesh.triangles[first:end]].astype(float)
+    geometry = prepared(ball(0.3, rings=60, sectors=80))
+    assert len(geometry.errors) > 2
+    for (first, end), error in zip(pairwise(geometry.levels.tolist()), geometry.errors.tolist(), strict=True):
+        corners = geometry.positions[geometry.triangles[first:end]].astype(float)
         distances = np.linalg.norm(
             np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1), axis=2
         )
@@ -74,10 +74,10 @@ def test_a_rough_scan_keeps_its_longest_edges_only():
     positions, triangles = plate(80)
     positions[:, 2] = np.random.default_rng(0).normal(0.0, 0.02, len(positions))
     positions[positions[:, 0] > 0.99, 0] += 0.05
-    mesh = prepared(glb(positions, triangles))
-    assert len(mesh.edges) == 2 * 8_000
+    geometry = prepared(glb(positions, triangles))
+    assert len(geometry.edges) == 2 * 8_000
     # The longer sides at the moved border are among those that are kept.
-    assert mesh.edges[:, 0].max() == pytest.approx(1.05, abs=1e-6)
+    assert geometry.edges[:, 0].max() == pytest.approx(1.05, abs=1e-6)
 
 
 def test_a_large_scan_is_reduced_before_its_errors_are_bounded(monkeypatch):
@@ -101,7 +101,7 @@ def test_a_level_is_kept_near_its_limit_and_changes_beyond():
     assert next_level(ERRORS, 0.1, 0) == 2
 
 
-def test_a_mesh_with_fewer_levels_than_before_gets_one_of_its_own():
+def test_a_shape_with_fewer_levels_than_before_gets_one_of_its_own():
     assert next_level((0.0,), 0.1, 2) == 0
 
 

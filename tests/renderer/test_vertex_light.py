@@ -10,14 +10,14 @@ from tests.renderer.bodies import ball, context_or_skip, cube
 from tests.renderer.make_pictures import free, front
 
 
-def lit_at(mesh, scale):
-    return int(counts_at(np.array([scale]), mesh.vertex_lit[:1])[0])
+def lit_at(geometry, scale):
+    return int(counts_at(np.array([scale]), geometry.vertex_lit[:1])[0])
 
 
 def test_flat_faces_are_lit_at_vertices_until_they_are_wide_in_the_picture():
-    mesh = prepared(cube(0.05))  # its faces' diagonals are 0.14 m long
-    assert lit_at(mesh, 1000.0) == 12
-    assert lit_at(mesh, 2000.0) == 0
+    geometry = prepared(cube(0.05))  # its faces' diagonals are 0.14 m long
+    assert lit_at(geometry, 1000.0) == 12
+    assert lit_at(geometry, 2000.0) == 0
 
 
 def triangle_turned(*turns, roughness):
@@ -39,10 +39,10 @@ def test_strongly_curved_triangles_are_lit_at_vertices_only_where_they_are_tiny(
 
 
 def test_the_number_of_triangles_grows_with_smaller_scales_down_to_all():
-    mesh = prepared(ball(0.3))
-    counts = mesh.vertex_lit[0].astype(int)
+    geometry = prepared(ball(0.3))
+    counts = geometry.vertex_lit[0].astype(int)
     assert (np.diff(counts) >= 0).all()
-    assert counts[-1] == len(mesh.finest)
+    assert counts[-1] == len(geometry.finest)
 
 
 def test_a_scale_above_all_lights_no_triangle_at_vertices():

@@ -12,7 +12,7 @@ from robomesh.bounded_json import MOST_DEPTH, _check_depth, loads
 from robomesh.contract.messages import JSON, decode_request
 from robomesh.errors import MessageError
 from robomesh.schemas.robomesh_pb2 import ViewRequest
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.gltf import read_glb
 
 VALUES = st.recursive(
@@ -61,10 +61,10 @@ def test_the_depth_of_a_long_text_is_found_with_little_memory(part):
     assert loads(text) == json.loads(text)
 
 
-def test_messages_and_meshes_that_are_nested_too_deeply_are_refused():
+def test_messages_and_shapes_that_are_nested_too_deeply_are_refused():
     with pytest.raises(MessageError, match="nested too deeply"):
         decode_request(ViewRequest, b'{"of": %s}' % nested(900).encode(), JSON)
     chunk = nested(900).encode()
     parts = (b"glTF", 2, 20 + len(chunk), len(chunk), b"JSON", chunk)
-    with pytest.raises(MeshError, match="nested too deeply"):
+    with pytest.raises(ShapeError, match="nested too deeply"):
         read_glb(struct.pack(f"<4sIII4s{len(chunk)}s", *parts))

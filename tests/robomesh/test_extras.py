@@ -10,7 +10,7 @@ import pytest
 from deploy.locked_parts import PARTS
 from robomesh import extras
 from robots.checks.plot import plot_check
-from robots.schema.errors import MeshError, SaveError
+from robots.schema.errors import SaveError, ShapeError
 from robots.shapes.files.step import read_step
 
 ROOT = Path(__file__).parents[2]
@@ -42,7 +42,7 @@ def test_a_step_file_without_its_reader_is_rejected_with_the_command(monkeypatch
     monkeypatch.setitem(sys.modules, "cascadio", None)
     path = tmp_path / "box.step"
     path.write_text("ISO-10303-21;")
-    with pytest.raises(MeshError, match=r"needs the package cascadio, .* add step"):
+    with pytest.raises(ShapeError, match=r"needs the package cascadio, .* add step"):
         read_step(path)
 
 

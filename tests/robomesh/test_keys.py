@@ -38,12 +38,12 @@ def test_request_is_parsed_once_by_its_client_and_once_by_its_owner(mesh, monkey
             parsed.append(key)
         return parse(key)
 
-    async def mesh_of(request):
+    async def shape_of(request):
         return b"mesh"
 
     async def main():
         async with open_session(mesh) as owner, open_session(mesh) as client:
-            owner.answer("site", "arm", "mesh/*", mesh_of)
+            owner.answer("site", "arm", "mesh/*", shape_of)
             key = "robomesh/site/arm/mesh/base"
             await client.ask_bytes(key, timeout_s=20.0)
             monkeypatch.setattr(keys, "parse_expression", count)

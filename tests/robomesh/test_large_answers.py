@@ -12,11 +12,11 @@ def test_answer_of_any_size_arrives_with_one_request(mesh, size):
         async with open_session(mesh) as owner, open_session(mesh) as asker:
             asked = []
 
-            async def mesh_of(request):
+            async def shape_of(request):
                 asked.append(request.chunk)
                 return b"\x5a" * size
 
-            owner.answer("hall", "arm", "mesh/*", mesh_of)
+            owner.answer("hall", "arm", "mesh/*", shape_of)
             answer = await asker.ask_bytes("robomesh/hall/arm/mesh/base", timeout_s=8.0)
             assert answer == b"\x5a" * size
             assert asked == ["base"]

@@ -8,7 +8,7 @@ from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.poses import rpy_rotation
-from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.geometry import Geometry, Material, Part
 from robots.shapes.solids import Solid, ball, box, moved
 
 # Stretched along x, the bars reach from 0.02 to 0.38 and from 0.42 to 0.78 m, 0.02 m to each side of y = 0,
@@ -72,7 +72,7 @@ def placed(x: float, y: float = 0.0, z: float = 0.0, *, yaw: float = 0.0) -> Flo
 def shape(*solids: Solid) -> Shape:
     """Join solids to one shape, in metres."""
     parts = tuple(Part("", Material(), points, np.zeros_like(points), faces) for points, faces in solids)
-    return Shape(Mesh(parts=parts), np.eye(4))
+    return Shape(Geometry(parts=parts), np.eye(4))
 
 
 def block(name: str, size: tuple[float, float, float], at: FloatArray, **more: object) -> Fixture:
@@ -99,7 +99,7 @@ def bracket(name: str, at: FloatArray, *, exact: bool) -> Fixture:
 
 
 def two_cheeks(name: str, at: FloatArray) -> Fixture:
-    """Return two plates 0.2 m apart, in one mesh."""
+    """Return two plates 0.2 m apart, in one shape."""
     plate = box(np.array([-0.5, -0.01, -0.1]), np.array([0.0, 0.01, 0.1]))
     return Fixture(name, (shape(moved(plate, placed(0, 0.11)), moved(plate, placed(0, -0.11))),), at)
 

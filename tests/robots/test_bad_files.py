@@ -9,9 +9,9 @@ import ezdxf
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files import step
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 
 FACES = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 DAE = """<?xml version="1.0" encoding="utf-8"?>
@@ -39,43 +39,45 @@ def written(folder: Path, name: str, content: str | bytes) -> Path:
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig"])
 def test_obj_and_collada_in_other_encodings_are_read(tmp_path: Path, encoding: str) -> None:
-    assert read_mesh(written(tmp_path, "a.obj", FACES.encode(encoding))).triangle_count == 1
+    assert read_geometry(written(tmp_path, "a.obj", FACES.encode(encoding))).triangle_count == 1
     text = dae().replace("utf-8", "utf-16") if "16" in encoding else dae()
-    mesh = read_mesh(written(tmp_path, "a.dae", text.encode(encoding)))
-    assert (mesh.triangle_count, mesh.unit_m, mesh.up) == (1, 0.001, "z")
+    geometry = read_geometry(written(tmp_path, "a.dae", text.encode(encoding)))
+    assert (geometry.triangle_count, geometry.unit_m, geometry.up) == (1, 0.001, "z")
 
 
 def test_a_collada_file_may_begin_with_an_empty_line(tmp_path: Path) -> None:
-    mesh = read_mesh(written(tmp_path, "a.dae", "  \n" + dae()))
-    assert (mesh.triangle_count, mesh.unit_m) == (1, 0.001)
+    geometry = read_geometry(written(tmp_path, "a.dae", "  \n" + dae()))
+    assert (geometry.triangle_count, geometry.unit_m) == (1, 0.001)
 
 
 def test_doctype_in_utf16_is_rejected(tmp_path: Path) -> None:
     bomb = '<?xml version="1.0" encoding="utf-16"?><!DOCTYPE COLLADA [<!ENTITY a "a">]><COLLADA>&a;</COLLADA>'
-    with pytest.raises(MeshError, match="DOCTYPE"):
-        read_mesh(written(tmp_path, "a.dae", bomb.encode("utf-16")))
+    with pytest.raises(ShapeError, match="DOCTYPE"):
+        read_geometry(written(tmp_path, "a.dae", bomb.encode("utf-16")))
 
 
 def test_obj_faces_may_have_negative_indices(tmp_path: Path) -> None:
     first = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf -3//-1 -2//-1 -1//-1 # -9\n"
     text = first + "v 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 5 \\\n -1\n"
-    mesh = read_mesh(written(tmp_path, "a.obj", text))
-    corners = {tuple(point) for part in mesh.parts for point in part.vertices[part.triangles[-1]].tolist()}
-    assert mesh.triangle_count == 2
+    geometry = read_geometry(written(tmp_path, "a.obj", text))
+    corners = {
+        tuple(point) for part in geometry.parts for point in part.vertices[part.triangles[-1]].tolist()
+    }
+    assert geometry.triangle_count == 2
     assert corners == {(5, 0, 0), (6, 0, 0), (5, 1, 0)}
 
 
 def test_negative_index_before_the_first_vertex_is_rejected(tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match="line 4: a face uses vertex -9; there are 3"):
-        read_mesh(written(tmp_path, "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 -2 -1\n"))
+    with pytest.raises(ShapeError, match="line 4: a face uses vertex -9; there are 3"):
+        read_geometry(written(tmp_path, "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -9 -2 -1\n"))
 
 
 def test_obj_of_thousands_of_materials_is_drawn_grey(tmp_path: Path) -> None:
     text = "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "".join(f"usemtl m{each}\nf 1 2 3\n" for each in range(2500))
-    mesh = read_mesh(written(tmp_path, "a.obj", text))
-    assert mesh.triangle_count == 2500
-    assert len(mesh.parts) == 1
-    assert "2500 materials" in mesh.warnings[0]
+    geometry = read_geometry(written(tmp_path, "a.obj", text))
+    assert geometry.triangle_count == 2500
+    assert len(geometry.parts) == 1
+    assert "2500 materials" in geometry.warnings[0]
 
 
 def test_collada_with_billions_of_nested_instances_is_rejected(tmp_path: Path) -> None:
@@ -84,16 +86,16 @@ def test_collada_with_billions_of_nested_instances_is_rejected(tmp_path: Path) -
         for each in range(1, 10)
     )
     library = f'<library_nodes><node id="n0"><instance_geometry url="#g"/></node>{nodes}</library_nodes>'
-    with pytest.raises(MeshError, match="1000000000 instances"):
-        read_mesh(written(tmp_path, "a.dae", dae(library, '<instance_node url="#n9"/>')))
+    with pytest.raises(ShapeError, match="1000000000 instances"):
+        read_geometry(written(tmp_path, "a.dae", dae(library, '<instance_node url="#n9"/>')))
     ring = '<library_nodes><node id="r"><instance_node url="#r"/></node></library_nodes>'
-    with pytest.raises(MeshError, match="contains itself"):
-        read_mesh(written(tmp_path, "a.dae", dae(ring, '<instance_node url="#r"/>')))
-    thrice = read_mesh(written(tmp_path, "b.dae", dae(library, '<instance_node url="#n1"/>')))
+    with pytest.raises(ShapeError, match="contains itself"):
+        read_geometry(written(tmp_path, "a.dae", dae(ring, '<instance_node url="#r"/>')))
+    thrice = read_geometry(written(tmp_path, "b.dae", dae(library, '<instance_node url="#n1"/>')))
     assert thrice.triangle_count == 10
 
 
-def test_gltf_with_too_many_uses_of_a_mesh_is_rejected(tmp_path: Path) -> None:
+def test_gltf_with_too_many_uses_of_a_shape_is_rejected(tmp_path: Path) -> None:
     data = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0) * 1000
     document = {
         "asset": {"version": "2.0"},
@@ -110,8 +112,8 @@ def test_gltf_with_too_many_uses_of_a_mesh_is_rejected(tmp_path: Path) -> None:
         "scenes": [{"nodes": list(range(200))}],
         "scene": 0,
     }
-    with pytest.raises(MeshError, match="draws 120000000 points"):
-        read_mesh(written(tmp_path, "a.gltf", json.dumps(document)))
+    with pytest.raises(ShapeError, match="draws 120000000 points"):
+        read_geometry(written(tmp_path, "a.gltf", json.dumps(document)))
 
 
 def test_invalid_dxf_entity_is_omitted_with_a_warning(tmp_path: Path) -> None:
@@ -123,10 +125,10 @@ def test_invalid_dxf_entity_is_omitted_with_a_warning(tmp_path: Path) -> None:
     space.add_line((0, 5), (1, 5))
     path = tmp_path / "a.dxf"
     drawing.saveas(path)
-    mesh = read_mesh(path)
-    (wire,) = mesh.wires
+    geometry = read_geometry(path)
+    (wire,) = geometry.wires
     assert len(wire.vertices) == 4
-    (warning,) = mesh.warnings
+    (warning,) = geometry.warnings
     assert warning.startswith(f"SPLINE {spline.dxf.handle} left out: it is broken")
 
 
@@ -140,9 +142,9 @@ def test_dxf_table_is_omitted_and_counted(tmp_path: Path, kind: str) -> None:
     assert line
     table = f"  0\n{kind}\n  5\nFFF1\n100\nAcDbEntity\n  8\n0\n100\nAcDbBlockReference\n  2\n*T1\n"
     path.write_text(f"{before}{table}{line}{after}")
-    mesh = read_mesh(path)
-    assert len(mesh.wires) == 1
-    assert mesh.warnings == (f"left out: 1 {kind}",)
+    geometry = read_geometry(path)
+    assert len(geometry.wires) == 1
+    assert geometry.warnings == (f"left out: 1 {kind}",)
 
 
 def test_step_that_needs_too_much_memory_is_rejected_with_that_reason(
@@ -153,11 +155,11 @@ def test_step_that_needs_too_much_memory_is_rejected_with_that_reason(
     file = written(tmp_path, "a.step", "ISO-10303-21;\n")
     for status in (step._OUT_OF_MEMORY, -6):
         done.returncode = status
-        with pytest.raises(MeshError, match="needs more than 6 GB of memory to read"):
-            read_mesh(file)
+        with pytest.raises(ShapeError, match="needs more than 6 GB of memory to read"):
+            read_geometry(file)
     done.returncode = 1
-    with pytest.raises(MeshError, match="found no STEP model"):
-        read_mesh(file)
+    with pytest.raises(ShapeError, match="found no STEP model"):
+        read_geometry(file)
 
 
 def test_obj_texture_and_normal_indices_may_be_negative(tmp_path: Path) -> None:
@@ -166,7 +168,7 @@ def test_obj_texture_and_normal_indices_may_be_negative(tmp_path: Path) -> None:
     rest = "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\n"
     faces = ["f -4/-3/-1 -2/-2/-1 -1/-1/-1 -3/-1/-1\n", "f -8/-3/-1 -7/-2/-1 -5/-1/-1\n"]
     text = "".join(f"o part{each}\n{points}{rest}usemtl m\ns off\n{''.join(faces)}" for each in range(2))
-    mesh = read_mesh(written(tmp_path, "a.obj", text))
-    corners = {tuple(p) for part in mesh.parts for p in part.vertices[np.unique(part.triangles)].tolist()}
-    assert mesh.triangle_count == 6
+    geometry = read_geometry(written(tmp_path, "a.obj", text))
+    corners = {tuple(p) for part in geometry.parts for p in part.vertices[np.unique(part.triangles)].tolist()}
+    assert geometry.triangle_count == 6
     assert corners == {(x, y, z) for x in (1, -1) for y in (1, -1) for z in (1, -1)} - {(1, -1, -1)}

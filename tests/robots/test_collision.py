@@ -20,7 +20,7 @@ from robots.collision import (
 )
 from robots.descriptions.cells import CellDescription, Fixture
 from robots.kinematics.kinematic_tree import Shape
-from robots.schema.errors import JointCountError, MeshError
+from robots.schema.errors import JointCountError, ShapeError
 from robots.schema.poses import rpy_rotation
 from tests.robots.boxes import bar_arm, block, bracket, cell_of, globe, placed, two_cheeks
 
@@ -155,7 +155,7 @@ def test_moving_the_whole_cell_changes_no_distance(tmp_path: Path) -> None:
     assert again[0].points[0] == pytest.approx(moved[:3, :3] @ first + moved[:3, 3], abs=1e-5)
 
 
-def test_hull_fills_a_bracket_that_the_exact_mesh_leaves_open(tmp_path: Path) -> None:
+def test_hull_fills_a_bracket_that_the_exact_shape_leaves_open(tmp_path: Path) -> None:
     def nearest(*, exact: bool) -> Nearest:
         # The elbow's bar ends 0.02 m before the back, 0.08 m from each cheek.
         cell = build_cell(arm_cell(tmp_path, bracket("bracket", placed(0.8), exact=exact)))
@@ -168,14 +168,14 @@ def test_hull_fills_a_bracket_that_the_exact_mesh_leaves_open(tmp_path: Path) ->
     assert nearest(exact=True).points[1][0] == pytest.approx(0.8, abs=1e-6)
 
 
-def test_disconnected_pieces_of_a_mesh_become_separate_hulls(tmp_path: Path) -> None:
+def test_disconnected_pieces_of_a_shape_become_separate_hulls(tmp_path: Path) -> None:
     cell = build_cell(arm_cell(tmp_path, two_cheeks("cheeks", placed(0.8))))
     found = outside_clearance(cell, "arm", STRETCHED, {})
     assert found is not None
     assert found.distance_m == pytest.approx(0.08, abs=1e-6)
 
 
-def test_exact_meshes_and_hulls_of_boxes_measure_the_same(tmp_path: Path) -> None:
+def test_exact_shapes_and_hulls_of_boxes_measure_the_same(tmp_path: Path) -> None:
     description = arm_cell(
         tmp_path, globe("ball", 0.1, placed(0.6, 0.4)), block("b", (0.1,) * 3, placed(0.2, 0.3))
     )
@@ -204,7 +204,7 @@ def test_links_without_shapes_are_reported_as_not_covered(tmp_path: Path) -> Non
     assert outside_clearance(cell, "seen", STRETCHED, {"bare": STRETCHED}) is None
 
 
-def test_bare_frames_are_not_reported_unless_a_mesh_is_missing(tmp_path: Path) -> None:
+def test_bare_frames_are_not_reported_unless_a_shape_is_missing(tmp_path: Path) -> None:
     look = "<visual><geometry>{}</geometry></visual>"
     text = """<robot name="stick">
 <link name="foot">{foot}</link><link name="flange"/><link name="stick">{stick}</link>
@@ -235,12 +235,12 @@ def test_pickled_cell_gives_the_same_distances(tmp_path: Path) -> None:
 def test_fixture_that_cannot_be_checked_is_refused_with_a_reason(tmp_path: Path) -> None:
     (tmp_path / "broken.wrl").write_text("#VRML V2.0 utf8\nShape {")
     broken = Fixture("jig", (Shape(tmp_path / "broken.wrl", ORIGIN),), ORIGIN)
-    with pytest.raises(MeshError, match=r"broken\.wrl"):
+    with pytest.raises(ShapeError, match=r"broken\.wrl"):
         build_cell(arm_cell(tmp_path / "a", broken))
-    with pytest.raises(MeshError, match=r"fixture jig: has no surface"):
+    with pytest.raises(ShapeError, match=r"fixture jig: has no surface"):
         build_cell(arm_cell(tmp_path / "a", Fixture("jig", (), ORIGIN)))
     wrong = replace(block("wall", (1.0, 1.0, 1.0), ORIGIN), ignore=("arm/elbw",))
-    with pytest.raises(MeshError, match=r"fixture wall: ignore 'arm/elbw': no such link.*'arm/elbow'"):
+    with pytest.raises(ShapeError, match=r"fixture wall: ignore 'arm/elbw': no such link.*'arm/elbow'"):
         build_cell(arm_cell(tmp_path / "a", wrong))
 
 

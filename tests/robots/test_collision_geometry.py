@@ -9,7 +9,7 @@ from robots.bodies.geometry import hull_body
 from robots.collision import build_cell, outside_nearest
 from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_mesh
+from robots.descriptions.glb import link_geometry
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import tree_of
 from services.command_line.main import run
@@ -39,7 +39,7 @@ def cell_of(model: Path) -> CellDescription:
 def corners(model: Path, link: str) -> tuple[FloatArray, FloatArray]:
     """Return the corners of the bounding box of a link's checked geometry."""
     (found,) = (each for each in tree_of(load(model)).links if each.name == link)
-    vertices = np.concatenate([part.vertices for part in link_mesh(found.checked).parts])
+    vertices = np.concatenate([part.vertices for part in link_geometry(found.checked).parts])
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
@@ -80,8 +80,8 @@ def test_real_robots_collision_files_are_checked_and_visual_files_drawn() -> Non
     for link in links.values():
         for shapes, folder in ((link.checked, "collision"), (link.shapes, "visual")):
             (shape,) = shapes
-            assert isinstance(shape.mesh, Path)
-            assert shape.mesh.parent.name == folder
+            assert isinstance(shape.source, Path)
+            assert shape.source.parent.name == folder
 
 
 @needs_real_robots

@@ -69,7 +69,7 @@ def test_problem_has_the_path_of_its_value(path: tuple[str | int, ...], value: o
     assert problem == Problem(expected, text)
 
 
-def test_wrong_types_hide_neither_missing_meshes_nor_what_is_wrong_elsewhere() -> None:
+def test_wrong_types_hide_neither_missing_shapes_nor_what_is_wrong_elsewhere() -> None:
     values = deepcopy(ARM)
     values["joint"][0]["a"] = "long"
     values["joint"][1] |= {"limits": [1.0, -1.0], "link": {"mesh": "none.wrl"}}
@@ -88,11 +88,11 @@ def test_confined_values_reach_no_file_outside_the_folder(tmp_path: Path) -> Non
     for path in (tmp_path / "out.stl", inside / "in.stl"):
         path.write_text("solid a\nendsolid a\n")
     (inside / "link.stl").symlink_to(tmp_path / "out.stl")
-    for mesh in ("../out.stl", str(tmp_path / "out.stl"), "link.stl", "../none.stl"):
-        values = changed(("base", "mesh"), mesh)
+    for geometry in ("../out.stl", str(tmp_path / "out.stl"), "link.stl", "../none.stl"):
+        values = changed(("base", "mesh"), geometry)
         (problem,) = problems(values, inside, confined=True)
         # A long path is shortened in the middle of the text.
-        assert problem.text.startswith(f"link 'base' mesh = {mesh!r}"[:60])
+        assert problem.text.startswith(f"link 'base' mesh = {geometry!r}"[:60])
         assert problem.text.endswith(": must be in the description's folder")
     assert problems(changed(("base", "mesh"), "in.stl"), inside, confined=True) == []
     # A description that is not confined may name files anywhere.

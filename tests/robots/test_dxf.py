@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files import dxf
 from robots.shapes.files.dxf import read_dxf
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
 ezdxf: Any = dxf._ezdxf()
 SQUARE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
@@ -23,7 +23,7 @@ def drawing() -> Any:
     return ezdxf.new("R2010", units=4)
 
 
-def read(folder: Path, drawing: Any, kind: str = "asc") -> Mesh:
+def read(folder: Path, drawing: Any, kind: str = "asc") -> Geometry:
     path = folder / "drawing.dxf"
     drawing.saveas(path, fmt=kind)
     return read_dxf(path)
@@ -33,10 +33,10 @@ def read(folder: Path, drawing: Any, kind: str = "asc") -> Mesh:
 def test_quadrilateral_face_becomes_two_triangles(tmp_path: Path, drawing: Any, kind: str) -> None:
     drawing.modelspace().add_3dface(SQUARE)
     drawing.modelspace().add_3dface([(0, 0, 5), (1, 0, 5), (0, 1, 5), (0, 1, 5)])
-    mesh = read(tmp_path, drawing, kind)
-    assert mesh.triangle_count == 3
-    np.testing.assert_array_equal(bounds(mesh), [[0, 0, 0], [1, 1, 5]])
-    assert (mesh.unit_m, mesh.up, mesh.warnings) == (0.001, "z", ())
+    geometry = read(tmp_path, drawing, kind)
+    assert geometry.triangle_count == 3
+    np.testing.assert_array_equal(bounds(geometry), [[0, 0, 0], [1, 1, 5]])
+    assert (geometry.unit_m, geometry.up, geometry.warnings) == (0.001, "z", ())
 
 
 def test_block_within_a_block_is_scaled_mirrored_turned_and_repeated(tmp_path: Path, drawing: Any) -> None:
@@ -52,9 +52,9 @@ def test_block_within_a_block_is_scaled_mirrored_turned_and_repeated(tmp_path: P
         (0, 0, 5),
         dxfattribs={"column_count": 3, "row_count": 2, "column_spacing": 100, "row_spacing": 50},
     )
-    mesh = read(tmp_path, drawing)
-    assert mesh.triangle_count == 6
-    np.testing.assert_allclose(bounds(mesh), [[8, -2, 5], [210, 50, 5]], atol=1e-9)
+    geometry = read(tmp_path, drawing)
+    assert geometry.triangle_count == 6
+    np.testing.assert_allclose(bounds(geometry), [[8, -2, 5], [210, 50, 5]], atol=1e-9)
 
 
 def test_polyface_polygon_mesh_and_mesh_are_triangles(tmp_path: Path, drawing: Any) -> None:
@@ -70,9 +70,9 @@ def test_polyface_polygon_mesh_and_mesh_are_triangles(tmp_path: Path, drawing: A
     with arrow.edit_data() as data:
         data.vertices = [(2, 0, 0), (-2, 3, 0), (-1, 0, 0), (-2, -3, 0)]
         data.faces = [(1, 2, 3, 0)]
-    mesh = read(tmp_path, drawing)
-    assert mesh.triangle_count == (2 + 1) + 2 * 3 * 2 + 2
-    (part,) = mesh.parts
+    geometry = read(tmp_path, drawing)
+    assert geometry.triangle_count == (2 + 1) + 2 * 3 * 2 + 2
+    (part,) = geometry.parts
     flat = part.vertices[part.triangles]
     arrow_area = sum(
         abs(np.cross(b - a, c - a)[2]) / 2
@@ -101,9 +101,9 @@ def test_curves_and_points_are_wires_and_no_triangles(tmp_path: Path, drawing: A
     space.add_lwpolyline([(0, 0), (1, 0), (1, 1)], close=True)
     space.add_circle((0, 0), 5)
     space.add_point((7, 8, 9))
-    mesh = read(tmp_path, drawing)
-    assert mesh.triangle_count == 0
-    lines, points = mesh.wires
+    geometry = read(tmp_path, drawing)
+    assert geometry.triangle_count == 0
+    lines, points = geometry.wires
     assert lines.segments[:4].tolist() == [[0, 1], [2, 3], [3, 4], [4, 5]]
     assert np.linalg.norm(lines.vertices[6:], axis=1) == pytest.approx(5.0, rel=1e-3)
     assert points.vertices.tolist() == [[7, 8, 9]]
@@ -112,7 +112,7 @@ def test_curves_and_points_are_wires_and_no_triangles(tmp_path: Path, drawing: A
 
 def test_curve_without_finite_points_is_rejected(tmp_path: Path, drawing: Any) -> None:
     drawing.modelspace().add_circle((float("nan"), 0), 5)
-    with pytest.raises(MeshError, match="CIRCLE on layer '0' has a point with a non-finite coordinate"):
+    with pytest.raises(ShapeError, match="CIRCLE on layer '0' has a point with a non-finite coordinate"):
         read(tmp_path, drawing)
 
 
@@ -141,7 +141,7 @@ def test_nested_blocks_with_millions_of_copies_are_rejected(tmp_path: Path, draw
         for _ in range(20):
             block.add_blockref(f"b{level - 1}", (0, 0))
     drawing.modelspace().add_blockref("b7", (0, 0))
-    with pytest.raises(MeshError, match="20001 copies of blocks; at most 20000 are read"):
+    with pytest.raises(ShapeError, match="20001 copies of blocks; at most 20000 are read"):
         read(tmp_path, drawing)
 
 
@@ -150,7 +150,7 @@ def test_huge_array_is_refused(tmp_path: Path, drawing: Any, row_spacing: int) -
     drawing.blocks.new("b").add_3dface(SQUARE)
     spread = {"column_count": 30000, "row_count": 30000, "column_spacing": 1, "row_spacing": row_spacing}
     drawing.modelspace().add_blockref("b", (0, 0), dxfattribs=spread)
-    with pytest.raises(MeshError, match="INSERT 'b': 900000000 copies"):
+    with pytest.raises(ShapeError, match="INSERT 'b': 900000000 copies"):
         read(tmp_path, drawing)
 
 
@@ -169,7 +169,7 @@ def test_copies_of_a_large_entity_are_refused(
     drawing.modelspace().add_blockref("b", (0, 0), dxfattribs={"column_count": 4, "column_spacing": 1})
     assert not read(tmp_path, drawing).warnings
     drawing.modelspace().add_blockref("b", (0, 0), dxfattribs={"column_count": 6, "column_spacing": 1})
-    with pytest.raises(MeshError, match="copies of blocks have more than 900 points"):
+    with pytest.raises(ShapeError, match="copies of blocks have more than 900 points"):
         read(tmp_path, drawing)
 
 
@@ -183,10 +183,10 @@ def test_entities_that_are_not_drawn_are_not_copied_with_their_block(
     block.add_hatch().paths.add_polyline_path(SQUARE)
     for place in range(2):
         drawing.modelspace().add_blockref("b", (place, 0), dxfattribs={"row_count": 3, "row_spacing": 1})
-    mesh = read(tmp_path, drawing)
+    geometry = read(tmp_path, drawing)
     assert not copied
-    assert mesh.warnings == ("left out: 6 HATCH",)
-    assert mesh.wires
+    assert geometry.warnings == ("left out: 6 HATCH",)
+    assert geometry.wires
 
 
 def test_truncated_file_is_repaired_or_rejected(tmp_path: Path, drawing: Any) -> None:
@@ -199,7 +199,7 @@ def test_truncated_file_is_repaired_or_rejected(tmp_path: Path, drawing: Any) ->
         path.write_bytes(whole[:end])
         try:
             warnings: tuple[str, ...] = read_dxf(path).warnings
-        except MeshError as error:
+        except ShapeError as error:
             warnings = (str(error),)
         assert "damaged" in warnings[0] or "drawing.dxf: " in warnings[0]
         assert "\n" not in warnings[0]
@@ -209,7 +209,7 @@ def test_truncated_file_is_repaired_or_rejected(tmp_path: Path, drawing: Any) ->
 def test_invalid_file_is_rejected_with_a_reason(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "wrong.dxf"
     path.write_bytes(content)
-    with pytest.raises(MeshError, match=r"wrong\.dxf: cannot be read as DXF"):
+    with pytest.raises(ShapeError, match=r"wrong\.dxf: cannot be read as DXF"):
         read_dxf(path)
 
 

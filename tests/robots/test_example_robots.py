@@ -10,7 +10,7 @@ from robots.collision import allowed_positions, build_cell, own_contacts
 from robots.descriptions.cells import CellDescription, CellRobot
 from robots.descriptions.description import EXAMPLES, from_values, known_names, library_names, load
 from robots.descriptions.example_robots import example_folder
-from robots.descriptions.glb import link_meshes
+from robots.descriptions.glb import link_glbs
 from robots.descriptions.urdf.write import to_urdf
 from robots.descriptions.urdf_to_dh import dh_form
 from robots.kinematics.joints import violations
@@ -148,9 +148,9 @@ def test_arms_as_rows_have_the_same_tool_placement(name: str, tmp_path: Path) ->
 @installed
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_links_of_an_example_robot_have_bodies(name: str, tmp_path: Path) -> None:
-    meshes = link_meshes(load(name), cache=tmp_path)
-    assert len(meshes) >= 7
-    assert all(glb.startswith(b"glTF") for glb in meshes.values())
+    shapes = link_glbs(load(name), cache=tmp_path)
+    assert len(shapes) >= 7
+    assert all(glb.startswith(b"glTF") for glb in shapes.values())
 
 
 @installed

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from robots.descriptions.description import load, parse
-from robots.descriptions.glb import _cached_glb, cache_folder, link_meshes
+from robots.descriptions.glb import _cached_glb, cache_folder, link_glbs
 from robots.kinematics.kinematic_tree import Shape
-from robots.schema.errors import MeshError
-from robots.shapes.files.read import read_mesh
-from robots.shapes.mesh import Material, Mesh, Part, bounds
+from robots.schema.errors import ShapeError
+from robots.shapes.files.read import read_geometry
+from robots.shapes.geometry import Geometry, Material, Part, bounds
 
 BOX = """#VRML V2.0 utf8
 Shape { appearance Appearance { material DEF %s Material { diffuseColor 1 0 0 transparency 0.5 } }
@@ -54,8 +54,8 @@ def corners(glb: bytes) -> tuple[np.ndarray, np.ndarray]:
     parsed = document(glb)
     used = [
         parsed["accessors"][primitive["attributes"]["POSITION"]]
-        for mesh in parsed["meshes"]
-        for primitive in mesh["primitives"]
+        for geometry in parsed["meshes"]
+        for primitive in geometry["primitives"]
     ]
     return (
         np.min([accessor["min"] for accessor in used], axis=0),
@@ -65,10 +65,10 @@ def corners(glb: bytes) -> tuple[np.ndarray, np.ndarray]:
 
 def one(folder: Path, material: str = "paint") -> dict[str, bytes]:
     (folder / "box.wrl").write_text(BOX % material)
-    return link_meshes(parse(ROBOT, folder / "robot.toml"), cache=folder / "cache")
+    return link_glbs(parse(ROBOT, folder / "robot.toml"), cache=folder / "cache")
 
 
-def test_mesh_is_scaled_turned_and_shifted_into_the_links_frame(tmp_path: Path) -> None:
+def test_shape_is_scaled_turned_and_shifted_into_the_links_frame(tmp_path: Path) -> None:
     low, high = corners(one(tmp_path)["base"])
     np.testing.assert_allclose([low, high], [[-0.1, -0.05, 0.0], [0.1, 0.05, 0.3]], atol=1e-7)
 
@@ -90,21 +90,21 @@ def test_transparent_material_is_blended(tmp_path: Path) -> None:
     assert materials["steel"].get("alphaMode", "OPAQUE") == "OPAQUE"
 
 
-def test_normals_are_transformed_with_the_mesh(tmp_path: Path) -> None:
-    for mesh in document(one(tmp_path)["base"])["meshes"]:
-        assert "NORMAL" in mesh["primitives"][0]["attributes"]
+def test_normals_are_transformed_with_the_shape(tmp_path: Path) -> None:
+    for geometry in document(one(tmp_path)["base"])["meshes"]:
+        assert "NORMAL" in geometry["primitives"][0]["attributes"]
 
 
-def test_link_without_a_mesh_has_no_glb(tmp_path: Path) -> None:
+def test_link_without_a_shape_has_no_glb(tmp_path: Path) -> None:
     assert list(one(tmp_path)) == ["base"]
 
 
-def test_changed_mesh_file_or_color_gives_another_glb(tmp_path: Path) -> None:
+def test_changed_shape_file_or_color_gives_another_glb(tmp_path: Path) -> None:
     first = one(tmp_path)["base"]
     assert one(tmp_path)["base"] == first
     assert one(tmp_path, "red")["base"] != first
     red = parse(ROBOT.replace("#0000ff", "#ff0000"), tmp_path / "robot.toml")
-    assert link_meshes(red, cache=tmp_path / "cache")["base"] != first
+    assert link_glbs(red, cache=tmp_path / "cache")["base"] != first
 
 
 def test_inlined_file_that_changes_is_noticed(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_inlined_file_that_changes_is_noticed(tmp_path: Path) -> None:
     sizes = []
     for size in ("10 10 10", "20 20 20"):
         (tmp_path / "part.wrl").write_text(f"#VRML V2.0 utf8\nShape {{ geometry Box {{ size {size} }} }}")
-        low, high = corners(link_meshes(description, cache=tmp_path / "cache")["base"])
+        low, high = corners(link_glbs(description, cache=tmp_path / "cache")["base"])
         sizes.append(float((high - low)[0]))
     assert sizes == pytest.approx([0.01, 0.02])
 
@@ -131,7 +131,7 @@ def test_appearing_and_disappearing_file_changes_the_glb(tmp_path: Path) -> None
     description = parse(ROBOT, tmp_path / "robot.toml")
 
     def width() -> float:
-        low, high = corners(link_meshes(description, cache=tmp_path / "cache")["base"])
+        low, high = corners(link_glbs(description, cache=tmp_path / "cache")["base"])
         return float((high - low)[0])
 
     def write(name: str, content: str) -> None:
@@ -152,9 +152,9 @@ def test_link_of_several_files_is_read_once(tmp_path: Path, monkeypatch: pytest.
     (tmp_path / "box.wrl").write_text('#VRML V2.0 utf8\nInline { url "part.wrl" }')
     (tmp_path / "part.wrl").write_text("#VRML V2.0 utf8\nShape { geometry Box { } }")
     description = parse(ROBOT, tmp_path / "robot.toml")
-    first = link_meshes(description, cache=tmp_path / "cache")
-    monkeypatch.setattr("robots.descriptions.glb.read_mesh", None)
-    assert link_meshes(description, cache=tmp_path / "cache") == first
+    first = link_glbs(description, cache=tmp_path / "cache")
+    monkeypatch.setattr("robots.descriptions.glb.read_geometry", None)
+    assert link_glbs(description, cache=tmp_path / "cache") == first
 
 
 def test_copied_file_uses_the_files_next_to_the_copy(tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_copied_file_uses_the_files_next_to_the_copy(tmp_path: Path) -> None:
             f"#VRML V2.0 utf8\nShape {{ geometry Box {{ size {size} }} }}"
         )
         description = parse(ROBOT, tmp_path / folder / "robot.toml")
-        found.append(link_meshes(description, cache=tmp_path / "cache")["base"])
+        found.append(link_glbs(description, cache=tmp_path / "cache")["base"])
     low, high = corners(found[1])
     assert (high - low)[0] == pytest.approx(0.02)
 
@@ -181,9 +181,9 @@ def test_copied_file_uses_the_files_next_to_the_copy(tmp_path: Path) -> None:
     ],
     ids=["colors", "normals", "two_sided", "name"],
 )
-def test_any_change_of_a_generated_mesh_changes_its_glb(tmp_path: Path, change: dict[str, Any]) -> None:
+def test_any_change_of_a_generated_shape_changes_its_glb(tmp_path: Path, change: dict[str, Any]) -> None:
     def glb(part: Part) -> bytes:
-        shape = Shape(Mesh((part,)), np.eye(4))
+        shape = Shape(Geometry((part,)), np.eye(4))
         return _cached_glb((shape,), tmp_path)
 
     part = Part("a", Material(), np.eye(3), np.array([[0.0, 0, 1]] * 3), np.array([[0, 1, 2]]))
@@ -194,8 +194,8 @@ def test_any_change_of_a_generated_mesh_changes_its_glb(tmp_path: Path, change: 
 def test_librarys_meshes_need_no_trimesh(tmp_path: Path) -> None:
     code = (
         "import sys; from robots.descriptions.description import load; "
-        "from robots.descriptions.glb import link_meshes; "
-        "meshes = link_meshes(load('pt600')); print(len(meshes), 'trimesh' in sys.modules)"
+        "from robots.descriptions.glb import link_glbs; "
+        "glbs = link_glbs(load('pt600')); print(len(glbs), 'trimesh' in sys.modules)"
     )
     answers = [
         subprocess.run(
@@ -217,16 +217,16 @@ def test_cache_that_cannot_be_written_falls_back(monkeypatch: pytest.MonkeyPatch
     assert blocker not in cache_folder().parents
 
 
-def test_invalid_mesh_file_is_reported(tmp_path: Path) -> None:
+def test_invalid_shape_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "box.wrl").write_bytes(b"MM\0\0")
-    with pytest.raises(MeshError, match=r"box\.wrl"):
-        link_meshes(parse(ROBOT, tmp_path / "robot.toml"), cache=tmp_path / "cache")
+    with pytest.raises(ShapeError, match=r"box\.wrl"):
+        link_glbs(parse(ROBOT, tmp_path / "robot.toml"), cache=tmp_path / "cache")
 
 
-def test_glb_has_the_mesh_files_shape(tmp_path: Path) -> None:
+def test_glb_has_the_shape_files_shape(tmp_path: Path) -> None:
     description = load("pt600")
     path = description.mesh_path(description.bodies["column"])
     assert path is not None
-    low, high = bounds(read_mesh(path))
-    glb_low, glb_high = corners(link_meshes(description, cache=tmp_path)["column"])
+    low, high = bounds(read_geometry(path))
+    glb_low, glb_high = corners(link_glbs(description, cache=tmp_path)["column"])
     np.testing.assert_allclose([glb_low, glb_high], [low / 1000, high / 1000], atol=1e-6)

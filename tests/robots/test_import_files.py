@@ -1,4 +1,4 @@
-"""Import of a robot.toml: all files that its meshes consist of are copied."""
+"""Import of a robot.toml: all files that its shapes consist of are copied."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def write(folder: Path, files: dict[str, str]) -> None:
         path.write_text(content)
 
 
-def test_files_that_a_mesh_names_are_copied_with_it(tmp_path: Path) -> None:
+def test_files_that_a_shape_names_are_copied_with_it(tmp_path: Path) -> None:
     files = {
         "meshes/base.wrl": f'{VRML}Inline {{ url "parts/a.wrl" }} EXTERNPROTO P [ ] "../lib.wrl#P" P {{ }}',
         "meshes/parts/a.wrl": f'{VRML}Inline {{ url "b.wrl" }}',
@@ -60,7 +60,7 @@ def test_files_that_cannot_be_copied_are_reported(tmp_path: Path) -> None:
         },
     )
     robot = import_robot(str(tmp_path / "robot" / "robot.toml"))
-    # A mesh outside the folder is copied into it, together with the files that it names.
+    # A shape outside the folder is copied into it, together with the files that it names.
     assert sorted(robot.files) == ["a.wrl", "meshes/base.wrl", "meshes/part.wrl"]
     assert robot.values["base"]["mesh"] == "meshes/base.wrl"
     assert robot.notes == (

@@ -15,7 +15,7 @@ from robots.kinematics.joints import joints_of
 from robots.programs.dxf import DxfPath, program_from_dxf
 from robots.programs.statements import MoveJoints, MoveLine
 from robots.programs.text import parse_program, pose_of
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 
 JOINTS = joints_of(load("pt600"))
 SQUARE = [(0.0, 0.0), (100.0, 0.0), (100.0, 50.0), (0.0, 50.0)]
@@ -96,7 +96,7 @@ def test_drawings_unit_is_applied(tmp_path: Path) -> None:
     found = moves(program_from_dxf(drawn(tmp_path, unit=1), ASKED))
     assert found[2][1][0, 3] == pytest.approx(2.54)
     with pytest.raises(
-        MeshError, match=r"does not state its unit \(\$INSUNITS\); give it with --unit, in mm"
+        ShapeError, match=r"does not state its unit \(\$INSUNITS\); give it with --unit, in mm"
     ):
         program_from_dxf(drawn(tmp_path, unit=0), ASKED)
     found = moves(program_from_dxf(drawn(tmp_path, unit=0), replace(ASKED, unit_mm=2.0)))
@@ -121,7 +121,7 @@ def test_drawings_unit_is_applied(tmp_path: Path) -> None:
 def test_curves_that_cannot_be_followed_are_refused_with_a_reason(
     tmp_path: Path, asked: DxfPath, sentence: str
 ) -> None:
-    with pytest.raises(MeshError, match=sentence):
+    with pytest.raises(ShapeError, match=sentence):
         program_from_dxf(drawn(tmp_path), asked)
 
 
@@ -242,7 +242,7 @@ def test_blocks_that_cannot_be_expanded_are_refused_at_once(
 ) -> None:
     path = blocks(tmp_path, fill)
     start = time.monotonic()
-    with pytest.raises(MeshError, match=sentence):
+    with pytest.raises(ShapeError, match=sentence):
         program_from_dxf(path, DxfPath())
     assert time.monotonic() - start < 2
 
@@ -251,6 +251,6 @@ def test_blocks_that_cannot_be_expanded_are_refused_at_once(
 def test_invalid_drawing_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "part.dxf"
     path.write_bytes(content)
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         program_from_dxf(path, ASKED)
     assert "\n" not in str(caught.value)

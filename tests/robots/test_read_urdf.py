@@ -8,13 +8,13 @@ import pinocchio
 import pytest
 
 from robots.descriptions.description import load
-from robots.descriptions.mesh_inspection import mesh_findings
+from robots.descriptions.shape_inspection import inspect_shapes
 from robots.descriptions.urdf.files import files_of
 from robots.descriptions.urdf.read import UrdfRobot, read_urdf
 from robots.kinematics.kinematic_tree import Shape, end_link
 from robots.kinematics.model import build_model, frame_placements, link_placements, tool_jacobian
 from robots.schema.errors import DescriptionError
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
 LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="1"/>'
 # A branching arm: skew axes, a slide, a gripper with a second finger that follows, a continuous joint.
@@ -147,11 +147,11 @@ def test_visual_and_collision_shapes_replace_each_other_where_one_is_missing() -
     assert links["hand"].shapes == links["hand"].checked == ()
 
 
-def test_meshes_of_round_collision_shapes_contain_the_shapes() -> None:
+def test_shapes_of_round_collision_shapes_contain_the_shapes() -> None:
     links = {link.name: link for link in read(ARM).tree.links}
     (around,) = links["pillar"].checked
-    assert isinstance(around.mesh, Mesh)
-    (part,) = around.mesh.parts
+    assert isinstance(around.source, Geometry)
+    (part,) = around.source.parts
     corners = part.vertices[part.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     depths = np.einsum("ij,ij->i", normals, corners[:, 0]) / np.linalg.norm(normals, axis=1)
@@ -182,8 +182,8 @@ def test_a_missing_file_counts_as_unchecked_only_where_a_check_would_use_it() ->
 
 
 def bounds_in_link(shape: Shape) -> tuple[list[float], list[float]]:
-    assert isinstance(shape.mesh, Mesh)
-    low, high = (corner + shape.shape_to_link[:3, 3] for corner in bounds(shape.mesh))
+    assert isinstance(shape.source, Geometry)
+    low, high = (corner + shape.shape_to_link[:3, 3] for corner in bounds(shape.source))
     return [round(float(value), 12) for value in low], [round(float(value), 12) for value in high]
 
 
@@ -210,14 +210,14 @@ def test_an_address_of_windows_is_taken_for_the_only_file_that_fits(tmp_path, ad
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("")
     urdf = tmp_path / "arm.urdf"
-    mesh = f'<link name="hand"><visual><geometry><mesh filename="{address}"/></geometry></visual></link>'
-    urdf.write_text(with_change('<link name="hand"/>', mesh))
+    geometry = f'<link name="hand"><visual><geometry><mesh filename="{address}"/></geometry></visual></link>'
+    urdf.write_text(with_change('<link name="hand"/>', geometry))
     robot = read_urdf(urdf.read_bytes(), urdf, resolve=files_of(urdf))
     assert robot.missing == ((address,) if note is None else ())
     told = [each for each in robot.notes if "is taken for" in each]
     assert told == ([f"mesh {address!r}: is taken for {note}"] if note else [])
     if note is None:
-        found, _ = mesh_findings(load(urdf))
+        found, _ = inspect_shapes(load(urdf))
         hint = found[0].text.removeprefix(f"mesh {address!r}: no such file; did you mean ")
         assert hint.lower() == "'meshes/arm.stl'?"
 
@@ -235,7 +235,7 @@ def test_a_long_address_or_many_of_them_take_no_long_time(tmp_path):
 def test_packages_are_found_above_and_beside_the_file_and_in_configured_folders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mesh = (
+    geometry = (
         '<link name="hand"><visual><geometry><mesh filename="{}" scale="1 2 3"/></geometry></visual></link>'
     )
     package = tmp_path / "arms"
@@ -246,15 +246,15 @@ def test_packages_are_found_above_and_beside_the_file_and_in_configured_folders(
 
     def found(address: str, **options: object) -> str | None:
         urdf = package / "urdf" / "arm.urdf"
-        text = with_change('<link name="hand"/>', mesh.format(address))
+        text = with_change('<link name="hand"/>', geometry.format(address))
         robot = read_urdf(text, urdf, resolve=files_of(urdf, **options))  # type: ignore[arg-type]
         (shape,) = next(link.shapes for link in robot.tree.links if link.name == "hand") or (None,)
         if shape is None:
             assert robot.missing == (address,)
             return None
         np.testing.assert_array_equal(shape.shape_to_link, np.diag([1, 2, 3, 1]))
-        assert isinstance(shape.mesh, Path)
-        return shape.mesh.name
+        assert isinstance(shape.source, Path)
+        return shape.source.name
 
     assert found("package://arms/meshes/a%20b.stl") == "a b.stl"
     assert found("../meshes/a b.stl") == "a b.stl"

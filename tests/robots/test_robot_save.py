@@ -14,7 +14,7 @@ import pytest
 
 from robots.descriptions.description import LIBRARY, load
 from robots.descriptions.description_text import description_text
-from robots.descriptions.glb import link_mesh, link_meshes
+from robots.descriptions.glb import link_geometry, link_glbs
 from robots.descriptions.save_description import (
     Saved,
     read_robot,
@@ -150,17 +150,17 @@ def test_robot_is_replaced_if_its_revision_is_unchanged(tmp_path):
 @pytest.mark.parametrize("change", ["added", "changed", "gone", "renamed", "a link"])
 def test_any_change_in_a_folder_changes_its_revision(tmp_path, change):
     before = save(tmp_path, 1).revision
-    mesh = tmp_path / "arm" / "meshes" / "a.wrl"
+    geometry = tmp_path / "arm" / "meshes" / "a.wrl"
     if change == "added":
         (tmp_path / "arm" / "README.md").write_text("hello")
     elif change == "changed":
-        mesh.write_bytes(content(1)[:-1] + b"x")
+        geometry.write_bytes(content(1)[:-1] + b"x")
     elif change == "gone":
-        mesh.unlink()
+        geometry.unlink()
     elif change == "renamed":
-        mesh.rename(mesh.with_name("b.wrl"))
+        geometry.rename(geometry.with_name("b.wrl"))
     else:
-        (tmp_path / "arm" / "link").symlink_to(mesh)
+        (tmp_path / "arm" / "link").symlink_to(geometry)
     assert revision_of(tmp_path / "arm") != before
 
 
@@ -320,15 +320,17 @@ def write_inlining_robot(folder, address):
 
 
 @pytest.mark.parametrize("address", ["../outside.wrl", "{folder}/outside.wrl", "link.wrl"])
-def test_mesh_reads_no_file_outside_the_robots_folder(tmp_path, address):
+def test_shape_reads_no_file_outside_the_robots_folder(tmp_path, address):
     (tmp_path / "outside.wrl").write_text(BOX)
     robot = tmp_path / "arm"
     write_inlining_robot(robot, address.format(folder=tmp_path))
     (robot / "link.wrl").symlink_to(tmp_path / "outside.wrl")
     (shape,) = tree_of(load(robot)).links[0].shapes
-    mesh = link_mesh([shape])
-    assert mesh.triangle_count == 12
-    assert "no such file in the folder 'arm'; other folders are not read; it is left out" in mesh.warnings[0]
+    geometry = link_geometry([shape])
+    assert geometry.triangle_count == 12
+    assert (
+        "no such file in the folder 'arm'; other folders are not read; it is left out" in geometry.warnings[0]
+    )
 
 
 @pytest.mark.parametrize("confined", [False, True])
@@ -353,11 +355,11 @@ def test_confined_robot_reads_no_file_of_another_folder(tmp_path):
     write_inlining_robot(robot, f"{tmp_path}/outside.wrl")
     cache = tmp_path / "cache"
     # The cache does not confuse this GLB with that of a robot that is not confined.
-    free = link_meshes(load(robot), cache=cache)["base"]
-    confined = link_meshes(load(robot, confined=True), cache=cache)["base"]
+    free = link_glbs(load(robot), cache=cache)["base"]
+    confined = link_glbs(load(robot, confined=True), cache=cache)["base"]
     (robot / "base.wrl").write_text(f'{BOX}Inline {{ url "{tmp_path}/none.wrl" }}\n')
     assert len(confined) < len(free)
-    assert link_meshes(load(robot), cache=cache)["base"] == confined
+    assert link_glbs(load(robot), cache=cache)["base"] == confined
 
 
 def test_confined_description_names_no_file_of_another_folder(tmp_path):

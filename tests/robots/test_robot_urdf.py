@@ -80,6 +80,8 @@ def test_frames_and_joints_keep_names_that_the_export_would_use(tmp_path: Path) 
 
 
 def test_every_link_names_its_glb() -> None:
-    text = to_urdf(load("pt600"), mesh_uri=lambda link: f"robomesh://{link}")
-    names = [mesh.get("filename") for mesh in Xml.fromstring(text).findall("link/visual/geometry/mesh")]
+    text = to_urdf(load("pt600"), shape_uri=lambda link: f"robomesh://{link}")
+    names = [
+        geometry.get("filename") for geometry in Xml.fromstring(text).findall("link/visual/geometry/mesh")
+    ]
     assert names == [f"robomesh://{link}" for link in load("pt600").link_names]

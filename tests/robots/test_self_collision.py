@@ -69,7 +69,7 @@ def touching(cell: Cell, *positions: float) -> list[tuple[str, str]]:
     return [each.pair for each in own_contacts(cell, "arm", np.array(positions))]
 
 
-def test_pair_of_which_only_hulls_touch_at_home_is_checked_as_meshes(tmp_path: Path) -> None:
+def test_pair_of_which_only_hulls_touch_at_home_is_checked_as_shapes(tmp_path: Path) -> None:
     cell = cell_of(hollow(tmp_path))
     pair = ("arm/base", "arm/hand")
     assert touching(cell, 0.0, 0.0) == []
@@ -93,7 +93,7 @@ def test_pair_of_which_only_hulls_touch_at_home_is_checked_as_meshes(tmp_path: P
 BESIDE = solid(0.12, "0.02 0.4 0.4") + solid(0.3, "0.02 0.4 0.4")
 
 
-def test_pair_apart_at_home_of_which_only_hulls_often_touch_is_checked_as_meshes(
+def test_pair_apart_at_home_of_which_only_hulls_often_touch_is_checked_as_shapes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model = hollow(tmp_path, base=BESIDE)
@@ -127,13 +127,13 @@ def test_pair_apart_at_home_of_which_only_hulls_often_touch_is_checked_as_meshes
     [solid(0.2, "0.2 0.4 0.4"), solid(0.2, "0.02 0.4 0.4")],
     ids=["its solid holds the hand", "its hull is its mesh"],
 )
-def test_pair_apart_at_home_stays_hulls_if_meshes_touch_as_often(tmp_path: Path, base: str) -> None:
+def test_pair_apart_at_home_stays_hulls_if_shapes_touch_as_often(tmp_path: Path, base: str) -> None:
     cell = cell_of(hollow(tmp_path, base=base))
     assert cell.arms["arm"].plan.elsewhere == ()
     assert touching(cell, 0.0, 0.2) == [("arm/base", "arm/hand")]
 
 
-def test_too_large_meshes_and_a_failed_study_leave_hulls(
+def test_too_large_shapes_and_a_failed_study_leave_hulls(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pair_study, "_failed", {})
@@ -291,7 +291,7 @@ def test_link_inside_another_touches_it_and_one_in_a_cavity_does_not(tmp_path: P
     assert abs(winding_number(shell, wall)) == pytest.approx(1.0)
 
 
-def test_only_a_pair_that_touches_everywhere_as_meshes_too_is_ignored(tmp_path: Path) -> None:
+def test_only_a_pair_that_touches_everywhere_as_shapes_too_is_ignored(tmp_path: Path) -> None:
     # The hand is a bar that goes through the base in every position.
     inside = solid(0, "1.2 0.05 0.05")
     always = cell_of(hollow(tmp_path, base=solid(0, "0.01 0.2 0.01"), hand=inside))

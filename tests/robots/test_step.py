@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
-from robots.shapes.files.read import read_mesh
+from robots.schema.errors import ShapeError
+from robots.shapes.files.read import read_geometry
 from robots.shapes.files.step import read_step
-from robots.shapes.mesh import bounds
+from robots.shapes.geometry import bounds
 
 MILLIMETRE = "SI_UNIT(.MILLI.,.METRE.)"
 METRE = "SI_UNIT($,.METRE.)"
@@ -121,11 +121,11 @@ def _listed(values: list[float]) -> str:
 def test_box_keeps_the_files_unit_axes_and_colour(tmp_path: Path, unit: str, unit_m: float) -> None:
     path = tmp_path / "box.step"
     path.write_text(step_box((10, 20, 30), unit=unit, color=(1.0, 0.5, 0.25)))
-    mesh = read_mesh(path)
-    assert mesh.triangle_count == 12
-    np.testing.assert_allclose(bounds(mesh), [[0, 0, 0], [10, 20, 30]], atol=1e-5)
-    assert mesh.parts[0].material.diffuse == pytest.approx((1.0, 0.5, 0.25), abs=0.01)
-    assert (mesh.unit_m, mesh.up, mesh.warnings) == (unit_m, "z", ())
+    geometry = read_geometry(path)
+    assert geometry.triangle_count == 12
+    np.testing.assert_allclose(bounds(geometry), [[0, 0, 0], [10, 20, 30]], atol=1e-5)
+    assert geometry.parts[0].material.diffuse == pytest.approx((1.0, 0.5, 0.25), abs=0.01)
+    assert (geometry.unit_m, geometry.up, geometry.warnings) == (unit_m, "z", ())
 
 
 @pytest.mark.slow
@@ -149,7 +149,7 @@ def test_triangles_face_outwards(tmp_path: Path) -> None:
 def test_invalid_file_is_rejected_with_a_reason(tmp_path: Path, content: bytes, expected: str) -> None:
     path = tmp_path / "broken.step"
     path.write_bytes(content)
-    with pytest.raises(MeshError, match=r"broken\.step") as caught:
+    with pytest.raises(ShapeError, match=r"broken\.step") as caught:
         read_step(path)
     assert expected in caught.value.reason
     assert "\n" not in str(caught.value)
@@ -160,7 +160,7 @@ def test_reading_is_stopped_at_the_time_limit(tmp_path: Path) -> None:
     path = tmp_path / "endless.step"
     # Open CASCADE hangs on a length that is no number.
     path.write_text(step_box((10, 20, 30)).replace("10.000000", "nan"))
-    with pytest.raises(MeshError, match="Open CASCADE"):
+    with pytest.raises(ShapeError, match="Open CASCADE"):
         read_step(path, time_limit_s=3.0)
 
 
@@ -170,7 +170,7 @@ def test_lack_of_memory_is_reported_instead_of_a_missing_model(tmp_path: Path, m
     path = tmp_path / "box.step"
     path.write_text(step_box((1, 2, 3)))
     # With so little memory it fails while it is loaded, or later without a message.
-    with pytest.raises(MeshError, match=r"GB of memory|more than 20 s"):
+    with pytest.raises(ShapeError, match=r"GB of memory|more than 20 s"):
         read_step(path, time_limit_s=20.0, memory_limit=megabytes << 20)
 
 
@@ -180,13 +180,13 @@ def test_iges_is_read_in_millimetres_whatever_its_unit_and_ending_are(tmp_path: 
     path = tmp_path / name
     # 10 x 20 x 30 inches, by Open CASCADE 8.0.
     path.write_bytes((Path(__file__).parent / "box_in_inches.igs").read_bytes())
-    mesh = read_mesh(path)
-    np.testing.assert_allclose(bounds(mesh), [[0, 0, 0], [254, 508, 762]], atol=1e-4)
-    volume = sum(np.linalg.det(p.vertices[t]) for p in mesh.parts for t in p.triangles) / 6
+    geometry = read_geometry(path)
+    np.testing.assert_allclose(bounds(geometry), [[0, 0, 0], [254, 508, 762]], atol=1e-4)
+    volume = sum(np.linalg.det(p.vertices[t]) for p in geometry.parts for t in p.triangles) / 6
     assert volume == pytest.approx(254 * 508 * 762, rel=1e-5)
-    assert (mesh.unit_m, mesh.up) == (0.001, "z")
-    assert mesh.warnings[-1] == "the colours of IGES are not read: export STEP to keep them"
-    assert len(mesh.warnings) == 1 + (name == "part.stl")
+    assert (geometry.unit_m, geometry.up) == (0.001, "z")
+    assert geometry.warnings[-1] == "the colours of IGES are not read: export STEP to keep them"
+    assert len(geometry.warnings) == 1 + (name == "part.stl")
 
 
 @pytest.mark.parametrize("kept", [0, 4, 60])
@@ -195,5 +195,5 @@ def test_a_cut_iges_file_is_rejected_with_a_reason(tmp_path: Path, kept: int) ->
     path = tmp_path / "cut.igs"
     whole = (Path(__file__).parent / "box_in_inches.igs").read_text()
     path.write_text("".join(whole.splitlines(keepends=True)[:kept]))
-    with pytest.raises(MeshError, match=r"is empty|Open CASCADE found no IGES model"):
-        read_mesh(path)
+    with pytest.raises(ShapeError, match=r"is empty|Open CASCADE found no IGES model"):
+        read_geometry(path)

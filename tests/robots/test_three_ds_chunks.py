@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.three_ds.read import read_3ds
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
 TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata" / "3ds"
 
@@ -46,7 +46,7 @@ def a_file(*editor: bytes, keyframes: bytes = b"") -> bytes:
     return chunk(0x4D4D, chunk(0x3D3D, *editor), keyframes)
 
 
-def read(folder: Path, data: bytes) -> Mesh:
+def read(folder: Path, data: bytes) -> Geometry:
     path = folder / "some.3ds"
     path.write_bytes(data)
     return read_3ds(path)
@@ -65,12 +65,12 @@ def key_object(name: str, number: int, parent: int, *tracks: bytes, instance: st
 
 def test_faces_of_several_materials_become_parts_and_the_rest_is_grey(tmp_path: Path) -> None:
     material = chunk(0xAFFF, chunk(0xA000, b"red\0"), chunk(0xA020, chunk(0x0011, b"\xff\0\0")))
-    mesh = read(
+    geometry = read(
         tmp_path, a_file(material, an_object(vertices(), faces(painted("red", 0, 2), painted("x", 1))))
     )
-    found = [(part.material.name, part.material.diffuse, len(part.triangles)) for part in mesh.parts]
+    found = [(part.material.name, part.material.diffuse, len(part.triangles)) for part in geometry.parts]
     assert found == [("red", (1.0, 0.0, 0.0), 2), ("x", (0.8, 0.8, 0.8), 1), ("", (0.8, 0.8, 0.8), 1)]
-    assert mesh.warnings == ("object 'tetra': no material 'x' in the file; drawn grey",)
+    assert geometry.warnings == ("object 'tetra': no material 'x' in the file; drawn grey",)
 
 
 @pytest.mark.parametrize(
@@ -107,15 +107,15 @@ def test_fractions_are_read_as_percent_or_float(tmp_path: Path, fraction: bytes)
         chunk(0xA081),
         chunk(0xA200, chunk(0xA300, b"WOOD.TGA\0")),
     )
-    mesh = read(tmp_path, a_file(material, an_object(vertices(), faces(painted("m", 0, 1, 2, 3)))))
-    (part,) = mesh.parts
+    geometry = read(tmp_path, a_file(material, an_object(vertices(), faces(painted("m", 0, 1, 2, 3)))))
+    (part,) = geometry.parts
     assert part.material.shininess == pytest.approx(0.4)
     assert part.material.transparency == pytest.approx(0.4)
     assert part.material.emissive == pytest.approx((0.4, 0.4, 0.0))
     assert part.material.specular == (0.0, 1.0, 0.0)
     assert part.material.texture == "WOOD.TGA"
     assert part.two_sided
-    assert mesh.warnings == ("textures are kept by name, not drawn: WOOD.TGA",)
+    assert geometry.warnings == ("textures are kept by name, not drawn: WOOD.TGA",)
 
 
 def test_faces_of_one_smoothing_group_share_their_normals(tmp_path: Path) -> None:
@@ -130,16 +130,16 @@ def test_faces_of_one_smoothing_group_share_their_normals(tmp_path: Path) -> Non
     assert normals(0x80000000, 0x80000000, 0x80000000, 0x80000000) == 4
 
 
-def volume(mesh: Mesh) -> float:
-    return sum(float(np.linalg.det(part.vertices[t])) for part in mesh.parts for t in part.triangles) / 6
+def volume(geometry: Geometry) -> float:
+    return sum(float(np.linalg.det(part.vertices[t])) for part in geometry.parts for t in part.triangles) / 6
 
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_faces_of_a_mirrored_object_point_outwards_in_either_order(tmp_path: Path, turned: bool) -> None:
     frame = chunk(0x4160, np.vstack([np.diag([-1.0, 1.0, 1.0]), np.zeros(3)]).astype("<f4").tobytes())
     numbers = [face[::-1] for face in FACES] if turned else FACES
-    mesh = read(tmp_path, a_file(an_object(vertices(), frame, faces(numbers=numbers))))
-    assert volume(mesh) == pytest.approx(1 / 6)
+    geometry = read(tmp_path, a_file(an_object(vertices(), frame, faces(numbers=numbers))))
+    assert volume(geometry) == pytest.approx(1 / 6)
 
 
 def test_hierarchy_sets_parents_and_pivots_but_moves_no_vertex(tmp_path: Path) -> None:
@@ -152,38 +152,41 @@ def test_hierarchy_sets_parents_and_pivots_but_moves_no_vertex(tmp_path: Path) -
             "$$$DUMMY", 3, 65535, track(0xB020, 1, 2, 3), track(0xB021, -quarter, 0, 0, 1), instance="arm"
         ),
     )
-    mesh = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
-    assert [(node.name, node.parent) for node in mesh.nodes] == [("tetra", 1), ("arm", -1)]
+    geometry = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
+    assert [(node.name, node.parent) for node in geometry.nodes] == [("tetra", 1), ("arm", -1)]
     # Clockwise about z by -90 degrees: x becomes y.
-    np.testing.assert_allclose(mesh.nodes[1].node_to_file[:3, 0], [0, 1, 0], atol=1e-7)
-    np.testing.assert_allclose(mesh.nodes[0].node_to_file[:3, 3], [1, 2 + 5, 3], atol=1e-6)
-    assert bounds(mesh)[1].tolist() == [1, 1, 1]
+    np.testing.assert_allclose(geometry.nodes[1].node_to_file[:3, 0], [0, 1, 0], atol=1e-7)
+    np.testing.assert_allclose(geometry.nodes[0].node_to_file[:3, 3], [1, 2 + 5, 3], atol=1e-6)
+    assert bounds(geometry)[1].tolist() == [1, 1, 1]
 
 
 def test_copies_in_the_key_frames_cause_a_warning(tmp_path: Path) -> None:
     keyframes = chunk(0xB000, key_object("tetra", 0, 65535), key_object("tetra", 1, 65535, instance="second"))
-    mesh = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
-    assert [node.name for node in mesh.nodes] == ["tetra", "tetra.second"]
-    assert mesh.warnings == ("object 'tetra': 1 copies of it in the key frames are not drawn",)
-    assert mesh.triangle_count == 4
+    geometry = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
+    assert [node.name for node in geometry.nodes] == ["tetra", "tetra.second"]
+    assert geometry.warnings == ("object 'tetra': 1 copies of it in the key frames are not drawn",)
+    assert geometry.triangle_count == 4
 
 
 def test_cyclic_hierarchy_is_omitted_with_a_warning(tmp_path: Path) -> None:
     keyframes = chunk(0xB000, key_object("tetra", 0, 1), key_object("b", 1, 0))
-    mesh = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
-    assert mesh.nodes == ()
-    assert "is nested deeper than 1000, or is its own ancestor; the hierarchy is left out" in mesh.warnings[0]
-    assert mesh.triangle_count == 4
+    geometry = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
+    assert geometry.nodes == ()
+    assert (
+        "is nested deeper than 1000, or is its own ancestor; the hierarchy is left out"
+        in geometry.warnings[0]
+    )
+    assert geometry.triangle_count == 4
 
 
 def test_wrong_lengths_of_outer_chunks_are_ignored_with_a_warning(tmp_path: Path) -> None:
     data = bytearray(a_file(an_object(vertices(), faces())))
     data[2:6] = struct.pack("<I", 0xFFFFFFFF)
     data[8:12] = struct.pack("<I", 0x7FFFFFFF)
-    mesh = read(tmp_path, bytes(data))
-    assert mesh.triangle_count == 4
-    assert mesh.warnings[0].startswith("byte 0: chunk 4D4D has 4294967295 bytes; ")
-    assert mesh.warnings[1].startswith("byte 6: chunk 3D3D has 2147483647 bytes; ")
+    geometry = read(tmp_path, bytes(data))
+    assert geometry.triangle_count == 4
+    assert geometry.warnings[0].startswith("byte 0: chunk 4D4D has 4294967295 bytes; ")
+    assert geometry.warnings[1].startswith("byte 6: chunk 3D3D has 2147483647 bytes; ")
 
 
 @pytest.mark.parametrize(
@@ -200,7 +203,7 @@ def test_wrong_lengths_of_outer_chunks_are_ignored_with_a_warning(tmp_path: Path
     ],
 )
 def test_invalid_object_is_rejected_with_the_byte(tmp_path: Path, contents: bytes, expected: str) -> None:
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         read(tmp_path, a_file(an_object(contents)))
     assert caught.value.place.startswith("byte ")
     assert expected in caught.value.reason
@@ -208,7 +211,7 @@ def test_invalid_object_is_rejected_with_the_byte(tmp_path: Path, contents: byte
 
 @pytest.mark.skipif(not TESTDATA.is_dir(), reason="the shared test data is not beside the checkout")
 @pytest.mark.parametrize("name", ["cubes_with_alpha.3DS", "test1.3ds"])
-def test_key_frames_of_real_files_give_the_local_frames_of_their_meshes(name: str) -> None:
+def test_key_frames_of_real_files_give_the_local_frames_of_their_shapes(name: str) -> None:
     data = (TESTDATA / name).read_bytes()
     nodes = read_3ds(TESTDATA / name).nodes
     assert nodes

@@ -8,8 +8,8 @@ import pytest
 
 from robots.descriptions.description import library_names, load
 from robots.descriptions.importing import import_robot
-from robots.descriptions.mesh_inspection import mesh_findings
 from robots.descriptions.save_description import write_folder
+from robots.descriptions.shape_inspection import inspect_shapes
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.joints import doubt_notes, doubt_texts, joints_of
 from robots.schema.errors import DescriptionError
@@ -61,10 +61,10 @@ def test_a_doubtful_limit_is_named_and_stays_doubtful_when_it_is_written(
     joints = joints_of(description)
     assert doubt_texts(joints) == {"j1": text}
     np.testing.assert_allclose((joints.lower[0], joints.upper[0], joints.max_speed[0]), values)
-    _, warnings = mesh_findings(description)
+    _, warnings = inspect_shapes(description)
     assert [each.text for each in warnings] == [*doubt_notes(description)]
     again = tmp_path / "again.urdf"
-    again.write_text(to_urdf(description, mesh_uri=lambda _: "arm.urdf"))
+    again.write_text(to_urdf(description, shape_uri=lambda _: "arm.urdf"))
     assert joints_of(load(again)).doubts == joints.doubts
     imported = import_robot(str(description.source))
     assert doubt_notes(description)[0] in imported.notes

@@ -79,14 +79,14 @@ def test_plain_joints_keep_their_names_and_the_meshes_are_those_of_the_mesh():
     urdf = Xml.fromstring(together([viewed("here", "pt600", pinocchio.SE3.Identity())], joints="plain"))
     names = {joint.get("name") for joint in urdf.findall("joint")}
     assert {"waist", "elbow"} <= names
-    assert {mesh.get("filename") for mesh in urdf.iter("mesh")} >= {"file:///base.glb"}
+    assert {geometry.get("filename") for geometry in urdf.iter("mesh")} >= {"file:///base.glb"}
     assert not list(urdf.iter("collision"))
 
 
 def test_without_joints_a_viewer_has_the_links_with_shapes_and_no_pose_of_its_own():
     arm = replace(
         viewed("here", "pt600", POSES["upright"]),
-        mesh_uri=lambda link: None if link.endswith("_axis") else f"{link}.glb",
+        shape_uri=lambda link: None if link.endswith("_axis") else f"{link}.glb",
     )
     urdf = Xml.fromstring(together([arm], joints="none"))
     links = {link.get("name") for link in urdf.findall("link")}

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
-from robots.shapes.files.read import read_mesh
+from robots.schema.errors import ShapeError
+from robots.shapes.files.read import read_geometry
 from robots.shapes.files.vrml.read import read_vrml
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
 TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata"
 
-Draw = Callable[[str], Mesh]
+Draw = Callable[[str], Geometry]
 
 # Printed with errors: a blank in the header, a name that begins with a digit, a sign apart from its digits.
 PAPER_SAMPLE = """# VRML V2.0 utf8
@@ -38,13 +38,13 @@ Shape {
 def test_papers_sample_is_read_with_warnings(tmp_path: Path) -> None:
     path = tmp_path / "a.wrl"
     path.write_text(PAPER_SAMPLE)
-    mesh = read_vrml(path)
-    low, high = bounds(mesh)
-    assert mesh.triangle_count == 8
+    geometry = read_vrml(path)
+    low, high = bounds(geometry)
+    assert geometry.triangle_count == 8
     assert low.tolist() == [-25.08, -6.161, -13.86]
     assert high.tolist() == [25.08, 30.8, 13.86]
-    assert mesh.parts[0].material.diffuse == (0.7, 0.7, 0.7)
-    assert mesh.warnings == (
+    assert geometry.parts[0].material.diffuse == (0.7, 0.7, 0.7)
+    assert geometry.warnings == (
         "line 1, column 1: the header has a blank, '# VRML'; it should be '#VRML V2.0 utf8'",
         "line 4, column 16: the name '1-FACES' begins with a digit; accepted",
         "line 8, column 17: a sign is separated from its digits by a blank; read as one number",
@@ -62,20 +62,20 @@ def expected_files(folder: str) -> list[dict[str, object]]:
 def test_real_file_has_the_triangles_and_bounds_that_other_readers_agree_on(
     expected: dict[str, object],
 ) -> None:
-    mesh = read_mesh(TESTDATA / str(expected["file"]))
-    low, high = bounds(mesh)
-    assert mesh.triangle_count == expected["triangles"]
+    geometry = read_geometry(TESTDATA / str(expected["file"]))
+    low, high = bounds(geometry)
+    assert geometry.triangle_count == expected["triangles"]
     np.testing.assert_allclose(low, expected["min"], atol=1e-5)
     np.testing.assert_allclose(high, expected["max"], atol=1e-5)
     # Some of the 3DS files have textures, which cause warnings.
-    assert mesh.warnings == () or str(expected["file"]).startswith("3ds/")
+    assert geometry.warnings == () or str(expected["file"]).startswith("3ds/")
 
 
-def test_truncated_file_is_an_error_or_a_smaller_mesh(tmp_path: Path) -> None:
+def test_truncated_file_is_an_error_or_a_smaller_shape(tmp_path: Path) -> None:
     path = tmp_path / "a.wrl"
     for end in range(20, len(PAPER_SAMPLE), 7):
         path.write_text(PAPER_SAMPLE[:end])
-        with suppress(MeshError):
+        with suppress(ShapeError):
             assert read_vrml(path).triangle_count <= 8
 
 
@@ -120,7 +120,7 @@ def test_list_read_in_pieces_keeps_every_number(draw: Draw) -> None:
 
 def refused_in_time(draw: Draw, text: str, reason: str) -> None:
     begin = time.monotonic()
-    with pytest.raises(MeshError, match=reason):
+    with pytest.raises(ShapeError, match=reason):
         draw(text)
     assert time.monotonic() - begin < 20
 
@@ -138,7 +138,7 @@ def test_uses_in_a_proto_cannot_exhaust_the_reader(draw: Draw) -> None:
     )
 
 
-def test_uses_of_a_large_mesh_are_counted(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_uses_of_a_large_shape_are_counted(draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robots.shapes.files.vrml.drawing.MAX_TRIANGLES", 100_000)
     uses = "DEF S " + grid(120) + "USE S " * 4
     refused_in_time(draw, f"Group {{ children [ {uses} ] }}", "draws more than 100000 triangles")

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.shapes.mesh import Material, Mesh, Wire
+from robots.shapes.geometry import Geometry, Material, Wire
 
-Draw = Callable[[str], Mesh]
+Draw = Callable[[str], Geometry]
 
 
 def material(draw: Draw, appearance: str) -> Material:
@@ -55,16 +55,16 @@ def test_shape_without_a_material_is_white(draw: Draw, appearance: str) -> None:
 def test_texture_is_stored_by_name(draw: Draw, tmp_path: Path) -> None:
     (tmp_path / "wood.png").write_bytes(b"")
     text = 'Appearance { material Material { } texture ImageTexture { url [ "none.gif", "wood.png" ] } }'
-    mesh = draw(f"Shape {{ appearance {text} geometry Box {{ }} }}")
-    assert mesh.parts[0].material.texture == "none.gif"
-    assert mesh.warnings == ()
+    geometry = draw(f"Shape {{ appearance {text} geometry Box {{ }} }}")
+    assert geometry.parts[0].material.texture == "none.gif"
+    assert geometry.warnings == ()
 
 
 def test_missing_texture_causes_one_warning(draw: Draw) -> None:
     shape = 'Shape { appearance Appearance { texture ImageTexture { url "none.png" } } geometry Box { } }'
-    mesh = draw(f"{shape}\n{shape}")
-    assert mesh.parts[1].material.texture == "none.png"
-    assert mesh.warnings == ("line 2, column 41: ImageTexture: 'none.png': no such file",)
+    geometry = draw(f"{shape}\n{shape}")
+    assert geometry.parts[1].material.texture == "none.png"
+    assert geometry.warnings == ("line 2, column 41: ImageTexture: 'none.png': no such file",)
 
 
 # Lines and points
@@ -75,9 +75,9 @@ RED, GREEN, BLUE, WHITE = [1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1]
 
 
 def wire(draw: Draw, geometry: str) -> Wire:
-    mesh = draw(f"Shape {{ geometry {geometry} }}")
-    assert mesh.parts == ()
-    (found,) = mesh.wires
+    geometry = draw(f"Shape {{ geometry {geometry} }}")
+    assert geometry.parts == ()
+    (found,) = geometry.wires
     return found
 
 
@@ -114,16 +114,16 @@ def test_lines_have_colors_per_vertex_and_per_line(
 
 
 def test_lines_to_missing_points_are_omitted_with_a_warning(draw: Draw) -> None:
-    mesh = draw(f"Shape {{ geometry IndexedLineSet {{ {POINTS} coordIndex [ 0 1 7 2 3 ] }} }}")
-    assert lines(mesh.wires[0]) == [[[0, 0, 0], [1, 0, 0]], [[1, 1, 0], [0, 1, 0]]]
-    assert "coordIndex contains 7; there are 4 points, 0 to 3" in mesh.warnings[0]
+    geometry = draw(f"Shape {{ geometry IndexedLineSet {{ {POINTS} coordIndex [ 0 1 7 2 3 ] }} }}")
+    assert lines(geometry.wires[0]) == [[[0, 0, 0], [1, 0, 0]], [[1, 1, 0], [0, 1, 0]]]
+    assert "coordIndex contains 7; there are 4 points, 0 to 3" in geometry.warnings[0]
 
 
 def test_points_are_moved_by_the_transform(draw: Draw) -> None:
-    mesh = draw(
+    geometry = draw(
         f"Transform {{ translation 0 0 5 children Shape {{ geometry PointSet {{ {POINTS} {COLORS} }} }} }}"
     )
-    (found,) = mesh.wires
+    (found,) = geometry.wires
     assert found.vertices[2].tolist() == [1, 1, 5]
     assert len(found.segments) == 0
     assert found.colors is not None
@@ -131,13 +131,13 @@ def test_points_are_moved_by_the_transform(draw: Draw) -> None:
 
 
 def test_points_with_too_few_colors_have_none(draw: Draw) -> None:
-    mesh = draw(f"Shape {{ geometry PointSet {{ {POINTS} color Color {{ color [ 1 0 0 ] }} }} }}")
-    assert mesh.wires[0].colors is None
-    assert "1 colors for 4 points" in mesh.warnings[0]
+    geometry = draw(f"Shape {{ geometry PointSet {{ {POINTS} color Color {{ color [ 1 0 0 ] }} }} }}")
+    assert geometry.wires[0].colors is None
+    assert "1 colors for 4 points" in geometry.warnings[0]
 
 
 def test_lines_and_points_count_as_no_triangles(draw: Draw) -> None:
-    mesh = draw(f"Shape {{ geometry PointSet {{ {POINTS} }} }} Shape {{ geometry IndexedLineSet {{ }} }}")
-    assert mesh.triangle_count == 0
-    assert len(mesh.wires) == 1
-    np.testing.assert_array_equal(mesh.wires[0].vertices[1], [1, 0, 0])
+    geometry = draw(f"Shape {{ geometry PointSet {{ {POINTS} }} }} Shape {{ geometry IndexedLineSet {{ }} }}")
+    assert geometry.triangle_count == 0
+    assert len(geometry.wires) == 1
+    np.testing.assert_array_equal(geometry.wires[0].vertices[1], [1, 0, 0])

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from robots.shapes import polygons
 from robots.shapes.faces import Faces, Table, surface
-from robots.shapes.mesh import Mesh, Part
+from robots.shapes.geometry import Geometry, Part
 from robots.shapes.polygons import Effort, ears
 
-Draw = Callable[[str], Mesh]
+Draw = Callable[[str], Geometry]
 
 # A square in z = 0 and, beyond its edge x = 1, a wall that rises in x = 1.
 POINTS = "coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0, 1 0 1, 1 1 1 ] }"
@@ -147,11 +147,13 @@ def test_given_normals_are_kept_for_clockwise_faces(draw: Draw) -> None:
 
 
 def test_too_few_normals_are_ignored_with_a_warning(draw: Draw) -> None:
-    mesh = draw(f"Shape {{ geometry IndexedFaceSet {{ normal Normal {{ vector [ 1 0 0 ] }} {TWO_FACES} }} }}")
-    assert mesh.warnings == (
+    geometry = draw(
+        f"Shape {{ geometry IndexedFaceSet {{ normal Normal {{ vector [ 1 0 0 ] }} {TWO_FACES} }} }}"
+    )
+    assert geometry.warnings == (
         "line 2, column 18: IndexedFaceSet: normal number 1; there are 1: normal is ignored",
     )
-    np.testing.assert_allclose(mesh.parts[0].normals[0], [0, 0, 1])
+    np.testing.assert_allclose(geometry.parts[0].normals[0], [0, 0, 1])
 
 
 # Colours
@@ -198,18 +200,20 @@ def test_colors_have_the_materials_opacity_also_with_smooth_normals(draw: Draw) 
 
 
 def test_too_short_color_index_is_ignored_with_a_warning(draw: Draw) -> None:
-    mesh = draw(f"Shape {{ geometry IndexedFaceSet {{ {SIX_COLORS} colorIndex [ 0 1 ] {TWO_FACES} }} }}")
-    assert mesh.parts[0].colors is None
-    assert "colorIndex is shorter than coordIndex" in mesh.warnings[0]
+    geometry = draw(f"Shape {{ geometry IndexedFaceSet {{ {SIX_COLORS} colorIndex [ 0 1 ] {TWO_FACES} }} }}")
+    assert geometry.parts[0].colors is None
+    assert "colorIndex is shorter than coordIndex" in geometry.warnings[0]
 
 
 # Elements that are missing
 
 
 def test_faces_of_missing_points_are_omitted_with_a_warning(draw: Draw) -> None:
-    mesh = draw(f"Shape {{ geometry IndexedFaceSet {{ {POINTS} coordIndex [ 0 1 9 -1 0 1 2 -1 7 8 9 ] }} }}")
-    assert mesh.triangle_count == 1
-    location, _, text = mesh.warnings[0].partition(": ")
+    geometry = draw(
+        f"Shape {{ geometry IndexedFaceSet {{ {POINTS} coordIndex [ 0 1 9 -1 0 1 2 -1 7 8 9 ] }} }}"
+    )
+    assert geometry.triangle_count == 1
+    location, _, text = geometry.warnings[0].partition(": ")
     assert location == "line 2, column 18"
     assert text == ("IndexedFaceSet: coordIndex contains 9; there are 6 points, 0 to 5: 2 faces are left out")
 
@@ -324,11 +328,11 @@ def test_face_beyond_the_effort_limit_is_cut_roughly_with_a_warning(
     monkeypatch.setattr(polygons, "_A_CORNER", 0)
     monkeypatch.setattr(polygons, "_BEYOND", -1)
     points = "coord Coordinate { point [ 2 1 0, 1 1 0, 1 2 0, 0 2 0, 0 0 0, 2 0 0 ] }"
-    mesh = draw(
+    geometry = draw(
         f"Shape {{ geometry IndexedFaceSet {{ convex FALSE {points} coordIndex [ 0 1 2 3 4 5 -1 ] }} }}"
     )
-    assert mesh.triangle_count == 4
-    (warning,) = mesh.warnings
+    assert geometry.triangle_count == 4
+    (warning,) = geometry.warnings
     assert warning.startswith("line 2, column 18: IndexedFaceSet: concave faces take too long")
 
 
@@ -340,9 +344,9 @@ def test_slow_faces_of_one_file_share_one_effort_limit(draw: Draw, monkeypatch: 
     effort = Effort()
     ears(outline, effort)
     monkeypatch.setattr(polygons, "_BEYOND", int(1.5 * (polygons._BEYOND - effort.left)))
-    mesh = draw(shape * 4)
-    assert mesh.triangle_count == 4 * (len(outline) - 2)
-    assert len([warning for warning in mesh.warnings if "too long to triangulate" in warning]) == 3
+    geometry = draw(shape * 4)
+    assert geometry.triangle_count == 4 * (len(outline) - 2)
+    assert len([warning for warning in geometry.warnings if "too long to triangulate" in warning]) == 3
 
 
 def test_corners_of_a_file_are_granted_once_however_often_a_proto_draws_them(
@@ -352,9 +356,9 @@ def test_corners_of_a_file_are_granted_once_however_often_a_proto_draws_them(
     outline = comb(500)
     body = face_set_text(outline).replace("convex FALSE", "convex IS c")
     monkeypatch.setattr(polygons, "_BEYOND", 0)
-    mesh = draw(f"PROTO P [ field SFBool c FALSE ] {{ {body} }} " + "P { } " * 100)
-    assert mesh.triangle_count == 100 * (len(outline) - 2)
-    rough = [warning for warning in mesh.warnings if "too long to triangulate" in warning]
+    geometry = draw(f"PROTO P [ field SFBool c FALSE ] {{ {body} }} " + "P { } " * 100)
+    assert geometry.triangle_count == 100 * (len(outline) - 2)
+    rough = [warning for warning in geometry.warnings if "too long to triangulate" in warning]
     # The text has a few characters a corner, so it pays for a few instances.
     assert len(rough) > 50
 

@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.vrml.lexer import Kind, Lexer
 from robots.shapes.files.vrml.read import read_vrml
 from robots.shapes.files.vrml.source import Source
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
-Draw = Callable[[str], Mesh]
+Draw = Callable[[str], Geometry]
 
 HEADER = "#VRML V2.0 utf8\n"
 SHAPE = """Shape { geometry IndexedFaceSet {
   coord Coordinate { point [ 0 0 0, 1 0 0, 0 1 0 ] } coordIndex [ 0 1 2 ] } }"""
 
 
-def read(folder: Path, data: bytes) -> Mesh:
+def read(folder: Path, data: bytes) -> Geometry:
     path = folder / "a.wrl"
     path.write_bytes(data)
     return read_vrml(path)
@@ -44,15 +44,15 @@ def read(folder: Path, data: bytes) -> Mesh:
     ],
 )
 def test_odd_file_is_read_with_a_warning(tmp_path: Path, text: str, warning: str) -> None:
-    mesh = read(tmp_path, text.encode())
-    assert mesh.triangle_count >= 1
-    assert any(said.startswith(warning) for said in mesh.warnings), mesh.warnings
+    geometry = read(tmp_path, text.encode())
+    assert geometry.triangle_count >= 1
+    assert any(said.startswith(warning) for said in geometry.warnings), geometry.warnings
 
 
 def test_latin_1_is_read_with_a_warning(tmp_path: Path) -> None:
-    mesh = read(tmp_path, f"{HEADER}# Stück\nDEF Grün {SHAPE}".encode("latin-1"))
-    assert mesh.parts[0].name == "Grün"
-    assert mesh.warnings == ("line 2, column 5: is not UTF-8; the file is read as Latin-1",)
+    geometry = read(tmp_path, f"{HEADER}# Stück\nDEF Grün {SHAPE}".encode("latin-1"))
+    assert geometry.parts[0].name == "Grün"
+    assert geometry.warnings == ("line 2, column 5: is not UTF-8; the file is read as Latin-1",)
 
 
 # Read without one: the standard allows it, or it does no harm.
@@ -78,10 +78,10 @@ def test_latin_1_is_read_with_a_warning(tmp_path: Path) -> None:
     ],
 )
 def test_what_the_standard_allows_is_read_without_a_warning(tmp_path: Path, text: str) -> None:
-    mesh = read(tmp_path, text.encode())
-    assert [corner.tolist() for corner in bounds(mesh)] == [[0, 0, 0], [1, 1, 0]]
-    assert mesh.triangle_count == 1
-    assert [warning for warning in mesh.warnings if "digit" not in warning] == []
+    geometry = read(tmp_path, text.encode())
+    assert [corner.tolist() for corner in bounds(geometry)] == [[0, 0, 0], [1, 1, 0]]
+    assert geometry.triangle_count == 1
+    assert [warning for warning in geometry.warnings if "digit" not in warning] == []
 
 
 @pytest.mark.parametrize("name", ["a.wrz", "a.wrl", "a.wrl.gz"])
@@ -92,14 +92,14 @@ def test_gzip_is_known_by_its_content(tmp_path: Path, name: str) -> None:
 
 
 def test_string_may_contain_quotes_brackets_and_line_breaks(draw: Draw) -> None:
-    mesh = draw(r'WorldInfo { title "a \" } ] # \\" info [ "one' + "\n" + 'two" "" ] } ' + SHAPE)
-    assert mesh.triangle_count == 1
+    geometry = draw(r'WorldInfo { title "a \" } ] # \\" info [ "one' + "\n" + 'two" "" ] } ' + SHAPE)
+    assert geometry.triangle_count == 1
 
 
 def test_list_with_comments_and_detached_signs_keeps_every_number(draw: Draw) -> None:
     text = "[ 0 0 0, # the first\n - 1 0 0, 0 - 1 0 # ]\n ]"
-    mesh = draw(SHAPE.replace("[ 0 0 0, 1 0 0, 0 1 0 ]", text))
-    assert [corner.tolist() for corner in bounds(mesh)] == [[-1, -1, 0], [0, 0, 0]]
+    geometry = draw(SHAPE.replace("[ 0 0 0, 1 0 0, 0 1 0 ]", text))
+    assert [corner.tolist() for corner in bounds(geometry)] == [[-1, -1, 0], [0, 0, 0]]
 
 
 # Refused
@@ -124,16 +124,16 @@ def test_list_with_comments_and_detached_signs_keeps_every_number(draw: Draw) ->
     ],
 )
 def test_file_of_another_format_is_rejected(tmp_path: Path, data: bytes, reason: str) -> None:
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         read(tmp_path, data)
     assert str(caught.value).startswith(str(tmp_path / "a.wrl"))
     assert reason in str(caught.value)
 
 
 def test_folder_and_missing_file_are_rejected(tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match="cannot be read: Is a directory"):
+    with pytest.raises(ShapeError, match="cannot be read: Is a directory"):
         read_vrml(tmp_path)
-    with pytest.raises(MeshError, match="cannot be read: No such file"):
+    with pytest.raises(ShapeError, match="cannot be read: No such file"):
         read_vrml(tmp_path / "none.wrl")
 
 
@@ -187,7 +187,7 @@ def face_set(points: str, rest: str = "coordIndex [ 0 1 2 ]") -> str:
 def test_error_of_an_invalid_file_has_line_and_column(
     draw: Draw, tmp_path: Path, text: str, expected: str
 ) -> None:
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         draw(text)
     assert str(caught.value).startswith(f"{tmp_path / 'a.wrl'}, line ")
     assert expected in str(caught.value)
@@ -196,23 +196,23 @@ def test_error_of_an_invalid_file_has_line_and_column(
 
 def test_lines_are_counted_with_any_line_ending(tmp_path: Path) -> None:
     for end in ("\n", "\r\n", "\r"):
-        with pytest.raises(MeshError, match="line 4, column 3: "):
+        with pytest.raises(ShapeError, match="line 4, column 3: "):
             read(tmp_path, f"#VRML V2.0 utf8{end}{end}Group {{{end}  5".encode())
 
 
 def test_error_about_a_long_token_is_short(draw: Draw) -> None:
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         draw("Group { children [ " + "}" * 1 + "x" * 100_000)
     assert len(caught.value.reason) < 120
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         draw("Shape { geometry " + "x" * 100_000)
     assert len(caught.value.reason) < 300
 
 
 def test_text_quoted_from_a_file_has_no_control_characters(draw: Draw) -> None:
-    mesh = draw(f"Evil\x1b {{ }} {SHAPE}")
-    assert mesh.warnings == ("line 2, column 1: Evil?: is not a node of VRML 2.0; skipped",)
-    with pytest.raises(MeshError) as caught:
+    geometry = draw(f"Evil\x1b {{ }} {SHAPE}")
+    assert geometry.warnings == ("line 2, column 1: Evil?: is not a node of VRML 2.0; skipped",)
+    with pytest.raises(ShapeError) as caught:
         draw("Evil\x1b [31m")
     assert caught.value.reason == r"'{' after 'Evil\x1b' was expected, not '['"
 
@@ -222,7 +222,7 @@ def test_text_quoted_from_a_file_has_no_control_characters(draw: Draw) -> None:
 
 @given(st.text(alphabet='{}[]"#-+.,01eEx \n\\ABDEFSU', max_size=60))
 def test_any_text_is_tokenised_completely_or_rejected(text: str) -> None:
-    with suppress(MeshError):  # of this string does not end
+    with suppress(ShapeError):  # of this string does not end
         lexer = Lexer(Source(Path("a.wrl"), text))
         for _ in range(len(text) + 1):
             if lexer.kind is Kind.END:

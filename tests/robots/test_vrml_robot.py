@@ -8,10 +8,10 @@ import pytest
 
 from robots.descriptions.vrml_robot import VrmlRobot, read_vrml_robot
 from robots.kinematics.kinematic_tree import BASE
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.robot_toml import JointType
 from robots.shapes.files.vrml.read import read_vrml
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
 PROTOS = """
 PROTO Joint [
@@ -83,12 +83,12 @@ def test_links_are_on_their_joints_with_their_shapes(tmp_path: Path) -> None:
     assert hand.link_to_joint[:3, 3].tolist() == [0, 0, 3]
     assert hand.shapes == ()
     (shape,) = upper.shapes
-    assert isinstance(shape.mesh, Mesh)
-    assert bounds(shape.mesh)[0].tolist() == [-1, -1, 6]
+    assert isinstance(shape.source, Geometry)
+    assert bounds(shape.source)[0].tolist() == [-1, -1, 6]
     assert shape.shape_to_link.tolist() == np.eye(4).tolist()
 
 
-def test_mesh_of_the_same_file_is_the_robot_at_zero(tmp_path: Path) -> None:
+def test_shape_of_the_same_file_is_the_robot_at_zero(tmp_path: Path) -> None:
     robot(tmp_path, ARM)
     low, high = bounds(read_vrml(tmp_path / "arm.wrl"))
     # The box at the waist, the upper one 7 above the shoulder, the ball at the elbow.
@@ -163,7 +163,7 @@ def test_names_are_made_safe_and_unique(tmp_path: Path) -> None:
     assert [known.name for known in found.tree.joints] == ["a_b", "a_b_2"]
 
 
-def test_missing_mesh_of_a_link_is_a_note(tmp_path: Path) -> None:
+def test_missing_shape_of_a_link_is_a_note(tmp_path: Path) -> None:
     found = robot(tmp_path, joint("A", TURNS, 'Segment { children Inline { url "x.wrl" } }'))
     assert "Inline: 'x.wrl': no such file; it is left out" in found.notes[0]
 
@@ -184,6 +184,6 @@ def test_missing_mesh_of_a_link_is_a_note(tmp_path: Path) -> None:
     ],
 )
 def test_invalid_robot_is_refused(tmp_path: Path, text: str, reason: str) -> None:
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         robot(tmp_path, text)
     assert reason in str(caught.value)

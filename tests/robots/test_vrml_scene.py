@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.vrml.parser import parse_vrml
 from robots.shapes.files.vrml.read import read_vrml
 from robots.shapes.files.vrml.source import load
 from robots.shapes.files.vrml.values import nodes_of, strings
-from robots.shapes.mesh import Mesh, bounds
+from robots.shapes.geometry import Geometry, bounds
 
-Draw = Callable[[str], Mesh]
+Draw = Callable[[str], Geometry]
 
 # One triangle with corners at the origin, x = 1 and y = 1.
 SHAPE = """Shape { geometry IndexedFaceSet {
@@ -21,17 +21,17 @@ SHAPE = """Shape { geometry IndexedFaceSet {
 BOX = "Shape { geometry Box { size 2 2 2 } }"
 
 
-def corners(mesh: Mesh) -> list[list[list[float]]]:
+def corners(geometry: Geometry) -> list[list[list[float]]]:
     """Return the three corners of each triangle, rounded."""
     return [
         triangle
-        for part in mesh.parts
+        for part in geometry.parts
         for triangle in (np.round(part.vertices[part.triangles], 9) + 0.0).tolist()
     ]
 
 
-def extent(mesh: Mesh) -> list[list[float]]:
-    return [np.round(corner, 9).tolist() for corner in bounds(mesh)]
+def extent(geometry: Geometry) -> list[list[float]]:
+    return [np.round(corner, 9).tolist() for corner in bounds(geometry)]
 
 
 def write(folder: Path, name: str, text: str) -> Path:
@@ -66,16 +66,18 @@ def test_transform_moves_its_children(draw: Draw, fields: str, low: list[float],
 
 def test_center_and_scale_orientation_follow_the_standard(draw: Draw) -> None:
     # Stretched along the diagonal about (1, 1, 0): (0, 0) goes to (-1, -1), and (1, 0) across it stays.
-    mesh = draw(
+    geometry = draw(
         f"""Transform {{ center 1 1 0 scaleOrientation 0 0 1 0.7853981633974483 scale 2 1 1
         children {SHAPE} }}"""
     )
-    assert corners(mesh) == [[[-1, -1, 0], [0.5, -0.5, 0], [-0.5, 0.5, 0]]]
+    assert corners(geometry) == [[[-1, -1, 0], [0.5, -0.5, 0], [-0.5, 0.5, 0]]]
 
 
 def test_transforms_apply_from_the_inside_outwards(draw: Draw) -> None:
-    mesh = draw(f"Transform {{ scale 2 2 2 children Transform {{ translation 1 0 0 children {SHAPE} }} }}")
-    assert corners(mesh) == [[[2, 0, 0], [4, 0, 0], [2, 2, 0]]]
+    geometry = draw(
+        f"Transform {{ scale 2 2 2 children Transform {{ translation 1 0 0 children {SHAPE} }} }}"
+    )
+    assert corners(geometry) == [[[2, 0, 0], [4, 0, 0], [2, 2, 0]]]
 
 
 def test_mirroring_scale_keeps_faces_and_normals_outwards(draw: Draw) -> None:
@@ -122,50 +124,50 @@ def test_switch_without_a_valid_choice_draws_nothing(draw: Draw, which: str) -> 
 
 
 def test_levels_of_a_switch_are_read_as_choices(draw: Draw) -> None:
-    mesh = draw(f"Switch {{ whichChoice 1 level [ {BOX} {SHAPE} ] }}")
-    assert mesh.triangle_count == 1
-    assert mesh.warnings == ("line 2, column 1: Switch: has 'level', a field of LOD; read as 'choice'",)
+    geometry = draw(f"Switch {{ whichChoice 1 level [ {BOX} {SHAPE} ] }}")
+    assert geometry.triangle_count == 1
+    assert geometry.warnings == ("line 2, column 1: Switch: has 'level', a field of LOD; read as 'choice'",)
 
 
 # DEF and USE
 
 
 def test_used_node_is_drawn_wherever_it_is_used(draw: Draw) -> None:
-    mesh = draw(f"DEF S {SHAPE} Transform {{ translation 5 0 0 children [ USE S, USE S ] }}")
-    assert mesh.triangle_count == 3
-    assert extent(mesh) == [[0, 0, 0], [6, 1, 0]]
+    geometry = draw(f"DEF S {SHAPE} Transform {{ translation 5 0 0 children [ USE S, USE S ] }}")
+    assert geometry.triangle_count == 3
+    assert extent(geometry) == [[0, 0, 0], [6, 1, 0]]
 
 
 def test_coordinates_and_appearance_can_be_used_again(draw: Draw) -> None:
-    mesh = draw(
+    geometry = draw(
         """Shape { appearance DEF A Appearance { material Material { diffuseColor 1 0 0 } }
           geometry IndexedFaceSet {
             coord DEF C Coordinate { point [ 0 0 0, 1 0 0, 0 1 0 ] } coordIndex [ 0 1 2 ] } }
         Shape { appearance USE A geometry IndexedFaceSet { coord USE C coordIndex [ 2 1 0 ] } }"""
     )
-    assert corners(mesh) == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 0], [1, 0, 0], [0, 0, 0]]]
-    assert mesh.parts[1].material.diffuse == (1, 0, 0)
+    assert corners(geometry) == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 0], [1, 0, 0], [0, 0, 0]]]
+    assert geometry.parts[1].material.diffuse == (1, 0, 0)
 
 
 def test_last_def_of_a_name_has_priority(draw: Draw) -> None:
-    mesh = draw(f"DEF S {BOX} DEF S {SHAPE} USE S")
-    assert mesh.triangle_count == 12 + 1 + 1
+    geometry = draw(f"DEF S {BOX} DEF S {SHAPE} USE S")
+    assert geometry.triangle_count == 12 + 1 + 1
 
 
 @pytest.mark.parametrize("text", ["USE Nobody", "Group { children [ USE Nobody ] }"])
 def test_use_of_an_unknown_name_is_omitted_with_a_warning(draw: Draw, text: str) -> None:
-    mesh = draw(f"{text} {SHAPE}")
-    assert mesh.triangle_count == 1
+    geometry = draw(f"{text} {SHAPE}")
+    assert geometry.triangle_count == 1
     column = text.index("USE") + 1
-    assert mesh.warnings == (
+    assert geometry.warnings == (
         f"line 2, column {column}: USE Nobody: no node was DEFined with that name before; left out",
     )
 
 
 def test_use_of_a_node_in_itself_is_omitted_with_a_warning(draw: Draw) -> None:
-    mesh = draw(f"DEF A Group {{ children [ {SHAPE} USE A ] }}")
-    assert mesh.triangle_count == 1
-    assert "USE A" in mesh.warnings[0]
+    geometry = draw(f"DEF A Group {{ children [ {SHAPE} USE A ] }}")
+    assert geometry.triangle_count == 1
+    assert "USE A" in geometry.warnings[0]
 
 
 # PROTO
@@ -182,9 +184,9 @@ PROTO Painted [ field SFColor tint 1 0 0 ] {
 
 
 def test_proto_is_drawn_with_its_fields(draw: Draw) -> None:
-    mesh = draw(PROTOS + "Part { at 5 0 0 shapes [ Painted { tint 0 0 1 } Painted { } ] }")
-    assert [part.material.diffuse for part in mesh.parts] == [(0, 0, 1), (1, 0, 0)]
-    assert extent(mesh) == [[4, -1, -1], [6, 1, 1]]
+    geometry = draw(PROTOS + "Part { at 5 0 0 shapes [ Painted { tint 0 0 1 } Painted { } ] }")
+    assert [part.material.diffuse for part in geometry.parts] == [(0, 0, 1), (1, 0, 0)]
+    assert extent(geometry) == [[4, -1, -1], [6, 1, 1]]
 
 
 def test_unused_proto_draws_nothing(draw: Draw) -> None:
@@ -192,36 +194,38 @@ def test_unused_proto_draws_nothing(draw: Draw) -> None:
 
 
 def test_proto_inside_itself_as_a_field_is_no_cycle(draw: Draw) -> None:
-    mesh = draw(PROTOS + f"Part {{ at 1 0 0 shapes Part {{ at 0 2 0 shapes {SHAPE} }} }}")
-    assert extent(mesh) == [[1, 2, 0], [2, 3, 0]]
+    geometry = draw(PROTOS + f"Part {{ at 1 0 0 shapes Part {{ at 0 2 0 shapes {SHAPE} }} }}")
+    assert extent(geometry) == [[1, 2, 0], [2, 3, 0]]
 
 
 def test_is_is_resolved_where_the_proto_is_used(draw: Draw) -> None:
     # Inner's `at` is Outer's `where`; both call the other's field by its own name.
-    mesh = draw(
+    geometry = draw(
         f"""PROTO Inner [ field SFVec3f at 9 9 9 ] {{ Transform {{ translation IS at children {SHAPE} }} }}
         PROTO Outer [ field SFVec3f where 0 0 0 field SFVec3f at 7 7 7 ] {{ Inner {{ at IS where }} }}
         Outer {{ where 1 2 3 }} Inner {{ }}"""
     )
-    assert corners(mesh)[0][0] == [1, 2, 3]
-    assert corners(mesh)[1][0] == [9, 9, 9]
+    assert corners(geometry)[0][0] == [1, 2, 3]
+    assert corners(geometry)[1][0] == [9, 9, 9]
 
 
 def test_proto_can_contain_protos(draw: Draw) -> None:
-    mesh = draw(
+    geometry = draw(
         f"""PROTO Outer [ ] {{
           PROTO Inner [ field SFVec3f at 1 0 0 ] {{ Transform {{ translation IS at children {SHAPE} }} }}
           Group {{ children [ Inner {{ }} Inner {{ at 2 0 0 }} ] }}
         }}
         Outer {{ }} Inner {{ }}"""
     )
-    assert [triangle[0] for triangle in corners(mesh)] == [[1, 0, 0], [2, 0, 0]]
-    assert mesh.warnings == ("line 7, column 19: Inner: is not a node of VRML 2.0; skipped",)
+    assert [triangle[0] for triangle in corners(geometry)] == [[1, 0, 0], [2, 0, 0]]
+    assert geometry.warnings == ("line 7, column 19: Inner: is not a node of VRML 2.0; skipped",)
 
 
 def test_names_in_a_proto_are_local(draw: Draw) -> None:
-    mesh = draw(f"DEF S {BOX} PROTO P [ ] {{ Group {{ children [ DEF S {SHAPE} USE S ] }} }} P {{ }} USE S")
-    assert mesh.triangle_count == 12 + 2 + 12
+    geometry = draw(
+        f"DEF S {BOX} PROTO P [ ] {{ Group {{ children [ DEF S {SHAPE} USE S ] }} }} P {{ }} USE S"
+    )
+    assert geometry.triangle_count == 12 + 2 + 12
 
 
 @pytest.mark.parametrize(
@@ -237,19 +241,19 @@ def test_names_in_a_proto_are_local(draw: Draw) -> None:
     ],
 )
 def test_proto_can_replace_any_node(draw: Draw, text: str) -> None:
-    mesh = draw(text)
-    assert extent(mesh) == [[-2, -2, -2], [2, 2, 2]]
+    geometry = draw(text)
+    assert extent(geometry) == [[-2, -2, -2], [2, 2, 2]]
     if "c 0 1 0" in text:
-        assert mesh.parts[0].material.diffuse == (0, 1, 0)
+        assert geometry.parts[0].material.diffuse == (0, 1, 0)
 
 
 def test_proto_can_replace_coordinates(draw: Draw) -> None:
-    mesh = draw(
+    geometry = draw(
         """PROTO C [ field MFVec3f p [ 0 0 0, 1 0 0, 0 1 0 ] ] { Coordinate { point IS p } }
         Shape { geometry IndexedFaceSet { coord C { } coordIndex [ 0 1 2 ] } }
         Shape { geometry IndexedFaceSet { coord C { p [ 0 0 9, 1 0 9, 0 1 9 ] } coordIndex [ 0 1 2 ] } }"""
     )
-    assert extent(mesh) == [[0, 0, 0], [1, 1, 9]]
+    assert extent(geometry) == [[0, 0, 0], [1, 1, 9]]
 
 
 def test_empty_proto_draws_nothing(draw: Draw) -> None:
@@ -258,8 +262,8 @@ def test_empty_proto_draws_nothing(draw: Draw) -> None:
 
 def test_proto_without_a_field_of_its_own_has_the_nodes(draw: Draw) -> None:
     # An event has no value: as if it were not written.
-    mesh = draw("PROTO P [ eventIn SFFloat r ] { Sphere { radius IS r } } Shape { geometry P { } }")
-    assert extent(mesh) == [[-1, -1, -1], [1, 1, 1]]
+    geometry = draw("PROTO P [ eventIn SFFloat r ] { Sphere { radius IS r } } Shape { geometry P { } }")
+    assert extent(geometry) == [[-1, -1, -1], [1, 1, 1]]
 
 
 @pytest.mark.parametrize(
@@ -277,7 +281,7 @@ def test_proto_uses_with_millions_of_nodes_are_rejected(tmp_path: Path, proto: s
     # In another file: all files of a scene count together.
     write(tmp_path, "part.wrl", f"{proto} {'P { } ' * 1500}")
     path = write(tmp_path, "a.wrl", f'{proto} {"P {} " * 1500} Inline {{ url "part.wrl" }}')
-    with pytest.raises(MeshError, match=r"part\.wrl.*PROTOs make more than 5000000 nodes and fields"):
+    with pytest.raises(ShapeError, match=r"part\.wrl.*PROTOs make more than 5000000 nodes and fields"):
         read_vrml(path)
 
 
@@ -297,10 +301,10 @@ def test_externproto_is_read_from_its_file(tmp_path: Path) -> None:
         f"""EXTERNPROTO Mine {declared} [ "http://x.org/l.wrl#At" "parts/library.wrl#At" ]
         Mine {{ }} Mine {{ at 5 0 0 }}""",
     )
-    mesh = read_vrml(path)
-    assert [triangle[0] for triangle in corners(mesh)] == [[3, 0, 0], [5, 0, 0]]
-    assert mesh.files == (tmp_path / "parts" / "library.wrl",)
-    assert mesh.warnings == ()
+    geometry = read_vrml(path)
+    assert [triangle[0] for triangle in corners(geometry)] == [[3, 0, 0], [5, 0, 0]]
+    assert geometry.files == (tmp_path / "parts" / "library.wrl",)
+    assert geometry.warnings == ()
 
 
 def test_externproto_without_a_name_is_the_files_first(tmp_path: Path) -> None:
@@ -335,10 +339,10 @@ def test_inline_in_an_externproto_is_beside_its_own_file(tmp_path: Path) -> None
 def test_missing_externproto_is_omitted_with_a_warning(tmp_path: Path, url: str, trouble: str) -> None:
     write(tmp_path, "library.wrl", LIBRARY)
     path = write(tmp_path, "a.wrl", f"EXTERNPROTO P [ ] {url} P {{ }} {SHAPE} P {{ }}")
-    mesh = read_vrml(path)
-    assert mesh.triangle_count == 1
-    assert f"P: EXTERNPROTO P: {trouble}" in mesh.warnings[0]
-    assert sum("EXTERNPROTO" in warning for warning in mesh.warnings) == 1
+    geometry = read_vrml(path)
+    assert geometry.triangle_count == 1
+    assert f"P: EXTERNPROTO P: {trouble}" in geometry.warnings[0]
+    assert sum("EXTERNPROTO" in warning for warning in geometry.warnings) == 1
 
 
 def test_cyclic_externprotos_are_rejected(tmp_path: Path) -> None:
@@ -346,10 +350,10 @@ def test_cyclic_externprotos_are_rejected(tmp_path: Path) -> None:
     path = write(
         tmp_path, "a.wrl", 'EXTERNPROTO Q [ ] "b.wrl#Q" PROTO P [ ] { Group { children Q { } } } P { }'
     )
-    with pytest.raises(MeshError, match=r"EXTERNPROTO . contains itself"):
+    with pytest.raises(ShapeError, match=r"EXTERNPROTO . contains itself"):
         read_vrml(path)
     itself = write(tmp_path, "c.wrl", 'EXTERNPROTO P [ ] "c.wrl#P" P { }')
-    with pytest.raises(MeshError, match="EXTERNPROTO P contains itself"):
+    with pytest.raises(ShapeError, match="EXTERNPROTO P contains itself"):
         read_vrml(itself)
 
 
@@ -364,9 +368,9 @@ def test_inline_is_read_beside_the_file_that_names_it(tmp_path: Path) -> None:
     path = write(
         tmp_path, "a.wrl", 'Transform { translation 0 0 3 children Inline { url [ "sub/part.wrl" ] } }'
     )
-    mesh = read_vrml(path)
-    assert corners(mesh)[0][0] == [0, 1, 3]
-    assert mesh.files == (tmp_path / "sub" / "part.wrl", tmp_path / "sub" / "deeper" / "shape.wrl")
+    geometry = read_vrml(path)
+    assert corners(geometry)[0][0] == [0, 1, 3]
+    assert geometry.files == (tmp_path / "sub" / "part.wrl", tmp_path / "sub" / "deeper" / "shape.wrl")
 
 
 @pytest.mark.parametrize(
@@ -393,38 +397,38 @@ def test_inline_reads_the_first_existing_url(tmp_path: Path) -> None:
 
 def test_missing_inline_is_omitted_with_a_warning(tmp_path: Path) -> None:
     path = write(tmp_path, "a.wrl", f'{SHAPE} Inline {{ url "none.wrl" }}\nInline {{ url "none.wrl" }}')
-    mesh = read_vrml(path)
-    assert mesh.triangle_count == 1
-    assert mesh.warnings == ("line 3, column 79: Inline: 'none.wrl': no such file; it is left out",)
+    geometry = read_vrml(path)
+    assert geometry.triangle_count == 1
+    assert geometry.warnings == ("line 3, column 79: Inline: 'none.wrl': no such file; it is left out",)
 
 
 def test_file_with_only_missing_inlines_is_empty_and_lists_them(tmp_path: Path) -> None:
     path = write(tmp_path, "a.wrl", 'Group { children [ Inline { url "x.wrl" } Inline { url "y.wrl" } ] }')
-    mesh = read_vrml(path)
-    assert mesh.triangle_count == 0
-    assert mesh.missing == ("x.wrl", "y.wrl")
-    assert mesh.warnings[0] == "line 2, column 20: Inline: 'x.wrl': no such file; it is left out"
+    geometry = read_vrml(path)
+    assert geometry.triangle_count == 0
+    assert geometry.missing == ("x.wrl", "y.wrl")
+    assert geometry.warnings[0] == "line 2, column 20: Inline: 'x.wrl': no such file; it is left out"
 
 
 def test_cyclic_inlines_are_rejected(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", 'Inline { url "a.wrl" }')
-    with pytest.raises(MeshError, match=r"b\.wrl, line 2, column 1: Inline: 'a.wrl' includes itself"):
+    with pytest.raises(ShapeError, match=r"b\.wrl, line 2, column 1: Inline: 'a.wrl' includes itself"):
         read_vrml(write(tmp_path, "a.wrl", 'Inline { url "b.wrl" }'))
-    with pytest.raises(MeshError, match="includes itself"):
+    with pytest.raises(ShapeError, match="includes itself"):
         read_vrml(write(tmp_path, "c.wrl", 'Inline { url "./c.wrl" }'))
 
 
 def test_repeated_inline_has_its_warnings_once(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", f"{SHAPE} Company {{ }}")
     path = write(tmp_path, "a.wrl", 'Inline { url "b.wrl" } Inline { url "b.wrl" } Company { }')
-    mesh = read_vrml(path)
-    assert mesh.triangle_count == 2
-    assert mesh.warnings == ("b.wrl, line 3, column 79: Company: is not a node of VRML 2.0; skipped",)
+    geometry = read_vrml(path)
+    assert geometry.triangle_count == 2
+    assert geometry.warnings == ("b.wrl, line 3, column 79: Company: is not a node of VRML 2.0; skipped",)
 
 
 def test_error_in_an_inline_names_its_file(tmp_path: Path) -> None:
     write(tmp_path, "b.wrl", "Shape {")
-    with pytest.raises(MeshError, match=r"b\.wrl, line 2, column 8: a field of Shape"):
+    with pytest.raises(ShapeError, match=r"b\.wrl, line 2, column 8: a field of Shape"):
         read_vrml(write(tmp_path, "a.wrl", f'{SHAPE} Inline {{ url "b.wrl" }}'))
 
 
@@ -445,7 +449,7 @@ def test_files_outside_the_folder_allowed_count_as_missing(tmp_path: Path) -> No
 
 
 def test_nodes_that_draw_nothing_are_named_once(draw: Draw) -> None:
-    mesh = draw(
+    geometry = draw(
         f"""WorldInfo {{ title "a {{ brace" info [ "x" "y" ] }}
         DEF T TimeSensor {{ loop TRUE }}
         DEF X Script {{ eventIn SFTime t field SFInt32 n 3 field SFNode self USE T
@@ -454,20 +458,20 @@ def test_nodes_that_draw_nothing_are_named_once(draw: Draw) -> None:
         PointLight {{ }} TimeSensor {{ }} Viewpoint {{ position 1 2 3 }}
         {SHAPE} # the end"""
     )
-    assert mesh.triangle_count == 1
-    assert mesh.warnings == (
+    assert geometry.triangle_count == 1
+    assert geometry.warnings == (
         "line 2, column 1: not drawn: WorldInfo, TimeSensor, Script, PointLight, Viewpoint",
     )
 
 
 def test_unknown_nodes_are_named_once_each(draw: Draw) -> None:
-    mesh = draw(
+    geometry = draw(
         f"""Company {{ secret [ 1 2 3 ] other NULL nested Thing {{ }} flags [ TRUE FALSE ] }} Company {{ }}
         Other {{ name "x" }} {SHAPE}
         Shape {{ geometry NurbsSurface {{ }} }} Shape {{ geometry Text {{ string "hi" }} }}"""
     )
-    assert mesh.triangle_count == 1
-    said = [warning.split(": ", 1)[1] for warning in mesh.warnings]
+    assert geometry.triangle_count == 1
+    said = [warning.split(": ", 1)[1] for warning in geometry.warnings]
     assert sorted(said) == [
         "Company: is not a node of VRML 2.0; skipped",
         "NurbsSurface: is not a geometry node of VRML 2.0; left out",

@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.vrml.extrusion import section_planes
-from robots.shapes.mesh import Mesh, Part, bounds
+from robots.shapes.geometry import Geometry, Part, bounds
 
-Draw = Callable[[str], Mesh]
+Draw = Callable[[str], Geometry]
 
 
 def solid(draw: Draw, geometry: str) -> Part:
@@ -98,9 +98,9 @@ def test_parts_of_a_cone_can_be_omitted(draw: Draw) -> None:
 
 
 def test_negative_size_is_read_as_positive_with_a_warning(draw: Draw) -> None:
-    mesh = draw("Shape { geometry Sphere { radius -2 } }")
-    assert bounds(mesh)[1].tolist() == [2, 2, 2]
-    assert mesh.warnings == ("line 2, column 18: Sphere: a size is -2; it must be above 0",)
+    geometry = draw("Shape { geometry Sphere { radius -2 } }")
+    assert bounds(geometry)[1].tolist() == [2, 2, 2]
+    assert geometry.warnings == ("line 2, column 18: Sphere: a size is -2; it must be above 0",)
 
 
 # ElevationGrid
@@ -199,16 +199,16 @@ def test_single_scale_and_orientation_apply_to_all_points(draw: Draw) -> None:
 
 
 def test_too_few_values_cause_a_warning(draw: Draw) -> None:
-    mesh = draw("Shape { geometry Extrusion { scale [ 1 1, 2 2 ] spine [ 0 0 0, 0 1 0, 0 2 0 ] } }")
-    assert "scale has 2 values for 3 spine points; the last is repeated" in mesh.warnings[0]
-    with pytest.raises(MeshError, match="scale is empty"):
+    geometry = draw("Shape { geometry Extrusion { scale [ 1 1, 2 2 ] spine [ 0 0 0, 0 1 0, 0 2 0 ] } }")
+    assert "scale has 2 values for 3 spine points; the last is repeated" in geometry.warnings[0]
+    with pytest.raises(ShapeError, match="scale is empty"):
         draw("Shape { geometry Extrusion { scale [ ] } }")
 
 
 def test_extrusion_of_one_point_draws_nothing_with_a_warning(draw: Draw) -> None:
-    mesh = draw("Shape { geometry Extrusion { spine [ 0 0 0 ] } }")
-    assert mesh.parts == ()
-    assert "has 1 spine and 5 crossSection points" in mesh.warnings[0]
+    geometry = draw("Shape { geometry Extrusion { spine [ 0 0 0 ] } }")
+    assert geometry.parts == ()
+    assert "has 1 spine and 5 crossSection points" in geometry.warnings[0]
 
 
 def test_ccw_false_turns_an_extrusion_inside_out(draw: Draw) -> None:

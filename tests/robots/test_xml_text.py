@@ -6,11 +6,11 @@ import pytest
 
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of
-from robots.schema.errors import DescriptionError, MeshError
+from robots.schema.errors import DescriptionError, ShapeError
 from robots.schema.xml_text import XmlError, read_xml
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 from tests.conftest import SHARED
-from tests.robots.test_mesh_formats import DAE
+from tests.robots.test_shape_formats import DAE
 
 FIELD = SHARED / "testdata" / "field"
 LATIN = '<?xml version="1.0" encoding="ISO-8859-1"?>\n<robot name="bras_école"/>'
@@ -100,20 +100,20 @@ def test_a_repeated_part_of_a_comment_takes_linear_time(part):
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "GBK", "utf-16"])
-def test_a_collada_mesh_is_read_in_its_own_encoding(tmp_path, encoding):
+def test_a_collada_shape_is_read_in_its_own_encoding(tmp_path, encoding):
     path = tmp_path / "a.dae"
     text = DAE.partition("?>")[2].lstrip()
     text = f'<?xml version="1.0" encoding="{encoding}"?>\n<!-- 大臂 -- 2 -->\n{text}'
     path.write_bytes(text.encode(encoding))
-    assert read_mesh(path).triangle_count > 0
+    assert read_geometry(path).triangle_count > 0
 
 
 def test_what_a_collada_file_hides_from_the_check_is_not_read(tmp_path):
     path = tmp_path / "a.dae"
     entity = '<?a <!-- ?><!DOCTYPE COLLADA [<!ENTITY x "1">]><?b --> ?>'
     path.write_text(DAE.replace("<COLLADA", f"{entity}<COLLADA", 1))
-    with pytest.raises(MeshError, match="DOCTYPE"):
-        read_mesh(path)
+    with pytest.raises(ShapeError, match="DOCTYPE"):
+        read_geometry(path)
 
 
 @pytest.mark.skipif(not FIELD.is_dir(), reason="the reference files (../shared) are not beside this checkout")

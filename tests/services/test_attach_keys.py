@@ -104,7 +104,7 @@ def test_only_the_ros2_certificate_publishes_to_ros_nodes(secured, tmp_path):
             ros.declare_subscriber("0/joint_states/**", lambda sample: got.append(str(sample.key_expr))),
         ):
             async with hall(secured) as robot, open_session(node) as session:
-                settings = Ros2Settings(meshes=tmp_path)
+                settings = Ros2Settings(shapes=tmp_path)
                 serving = asyncio.create_task(serve_ros2(session, settings))
                 try:
                     states = robot.declare_publisher("hall", "arm", "joints")

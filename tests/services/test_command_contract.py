@@ -39,8 +39,8 @@ CONTRACT = {
     "robot show": ("--json",),
     "robot import": (),
     "robot export": (),
-    "mesh info": ("--json",),
-    "mesh convert": (),
+    "shapes info": ("--json",),
+    "shapes convert": (),
     "fk": ("--robot", "--json"),
     "ik": ("--robot", "--json"),
     "program check": ("--robot", "--site", "--json"),
@@ -105,7 +105,7 @@ def test_help_imports_no_command_and_nothing_heavy() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["robot", "mesh", "program", "recordings", "audit", "keys"])
+@pytest.mark.parametrize("name", ["robot", "shapes", "program", "recordings", "audit", "keys"])
 def test_help_of_a_group_imports_only_that_group(name: str) -> None:
     imported = imported_by(name, "--help")
     rows = {f"services.command_line.{row.module}" for row in COMMANDS.values()}

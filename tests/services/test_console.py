@@ -409,7 +409,7 @@ def test_the_page_may_run_only_its_own_code_and_only_hashed_files_are_kept(mesh,
     run(main())
 
 
-def test_a_mesh_is_asked_of_the_robot_and_checked_by_its_hash(mesh, page):
+def test_a_shape_is_asked_of_the_robot_and_checked_by_its_hash(mesh, page):
     async def main():
         async with console(mesh, page) as (address, other):
             asked = []

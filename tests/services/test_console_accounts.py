@@ -208,12 +208,12 @@ def test_a_download_ends_with_its_session(mesh, page, tmp_path):
         async with guarded(mesh, page, tmp_path) as (client, other, _):
             begun, go_on = asyncio.Event(), asyncio.Event()
 
-            async def mesh_of_link(request):
+            async def shape_of_link(request):
                 begun.set()
                 await go_on.wait()
                 return b"glTF"
 
-            other.answer("s", "r", "mesh/*", mesh_of_link)
+            other.answer("s", "r", "mesh/*", shape_of_link)
             await client.sign_in("li")
             fetched = asyncio.create_task(fetch(client, "/mesh/s/r/base"))
             async with asyncio.timeout(10.0):

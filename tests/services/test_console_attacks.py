@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from robomesh.client.recordings import recorder_file as recorder
 from robomesh.schemas.robomesh_pb2 import FromPage
-from services.console.http import meshes
+from services.console.http import shapes
 from services.console.serving import uvicorn_server
 from services.console.serving.listener import Listener
 from services.console.serving.request_timeout import Connection
@@ -124,9 +124,9 @@ TRAVERSALS = [
 ]
 
 
-def test_no_path_leads_out_of_pages_meshes_and_recordings(mesh, page, tmp_path, monkeypatch):
+def test_no_path_leads_out_of_pages_shapes_and_recordings(mesh, page, tmp_path, monkeypatch):
     # No service of this mesh answers for meshes and recordings.
-    monkeypatch.setattr(meshes, "_TIMEOUTS_S", (0.2,))
+    monkeypatch.setattr(shapes, "_TIMEOUTS_S", (0.2,))
     monkeypatch.setattr(recorder, "_TIMEOUTS_S", (0.2,))
     (page.parent / "pyproject.toml").write_text("root: secret")
 

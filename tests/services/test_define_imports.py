@@ -180,7 +180,7 @@ def test_an_imported_robot_is_checked_against_itself_like_its_urdf(page):
 def test_a_urdf_becomes_rows_that_put_every_link_where_it_was(page):
     draft = page.draft("puma560")
     description = load("puma560")
-    text = to_urdf(description, mesh_uri=lambda link: f"package://puma/meshes/{link}.stl")
+    text = to_urdf(description, shape_uri=lambda link: f"package://puma/meshes/{link}.stl")
     box = page.upload(trimesh.creation.box((0.1, 0.1, 0.1)).export(file_type="stl"))
     files = {"puma/puma.urdf": page.upload(text.encode())}
     for link in ("base", "column"):
@@ -261,7 +261,7 @@ def test_no_urdf_shows_a_file_of_the_servers(page):
 def test_a_saved_robot_by_urdf_is_listed_and_opened_as_rows(page):
     robot = page.folder / "robots" / "by-urdf"
     robot.mkdir(parents=True)
-    (robot / "puma.urdf").write_text(to_urdf(load("puma560"), mesh_uri=lambda link: f"{link}.stl"))
+    (robot / "puma.urdf").write_text(to_urdf(load("puma560"), shape_uri=lambda link: f"{link}.stl"))
     (robot / "robot.toml").write_text('name = "by-urdf"\nurdf = "puma.urdf"\n')
     rows = {row["name"]: row for row in page.get("/robots").json["robots"]}
     assert rows["by-urdf"]["joints"] == 6
@@ -330,7 +330,7 @@ def test_a_zip_whose_entry_is_larger_than_it_says_is_refused(page):
 
 @pytest.mark.slow
 def test_a_robot_toml_in_a_dropped_folder_that_names_a_urdf_becomes_rows(page):
-    urdf = to_urdf(load("puma560"), mesh_uri=lambda link: f"{link}.stl").encode()
+    urdf = to_urdf(load("puma560"), shape_uri=lambda link: f"{link}.stl").encode()
     files = {
         "puma/robot.toml": page.upload(b'name = "puma"\nurdf = "puma.urdf"\n'),
         "puma/puma.urdf": page.upload(urdf),

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio
 import pytest
 
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 from robots.shapes.surface_points import surface_points
 from tests import page_modules
 
@@ -62,7 +62,7 @@ def test_parts_of_a_real_arm_without_names_are_ordered_by_what_touches(module, s
     pinocchio.updateGeometryPlacements(model, data, shapes, places, pinocchio.neutral(model))
     parts = []
     for letter, shape, place in zip("fbgdaec", shapes.geometryObjects, places.oMg, strict=True):
-        own = surface_points(read_mesh(Path(shape.meshPath)), 200) * shape.meshScale.ravel()
+        own = surface_points(read_geometry(Path(shape.meshPath)), 200) * shape.meshScale.ravel()
         parts.append(
             {"path": f"part-{letter}.stl", "points": (own @ place.rotation.T + place.translation).tolist()}
         )

@@ -96,7 +96,7 @@ def test_a_file_whose_name_leads_elsewhere_is_refused(page, name):
 
 
 @pytest.mark.slow
-def test_a_mesh_is_converted_in_its_own_units(page):
+def test_a_shape_is_converted_in_its_own_units(page):
     answer = page.post("/mesh", {"file": "m/a.wrl", "files": {"m/a.wrl": page.upload(TRIANGLE)}}).json
     assert (answer["triangles"], answer["min"], answer["max"]) == (1, [0, 0, 0], [2, 3, 0])
     glb = page.get(f"/glb/{answer['glb']}")
@@ -112,7 +112,7 @@ def test_an_inlined_file_is_found_beside_the_other(page):
 
 
 @pytest.mark.slow
-def test_a_broken_mesh_is_reported_without_the_servers_folders(page):
+def test_a_broken_shape_is_reported_without_the_servers_folders(page):
     broken = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": page.upload(TRIANGLE[:-9])}})
     assert (broken.status, broken.code) == (422, "define.unreadable")
     assert broken.json["text"].startswith("a.wrl")
@@ -121,7 +121,7 @@ def test_a_broken_mesh_is_reported_without_the_servers_folders(page):
 
 @pytest.mark.parametrize("address", ["{}/secret.wrl", "../../../secret.wrl", "file://{}/secret.wrl"])
 @pytest.mark.slow
-def test_no_mesh_shows_a_file_of_the_servers(page, address):
+def test_no_shape_shows_a_file_of_the_servers(page, address):
     (page.folder / "secret.wrl").write_bytes(TRIANGLE)
     text = f'#VRML V2.0 utf8\nInline {{ url "{address.format(page.folder)}" }}\n'
     answer = page.post("/mesh", {"file": "a.wrl", "files": {"a.wrl": page.upload(text.encode())}})
@@ -268,7 +268,7 @@ def test_two_that_save_over_the_same_at_once_do_not_both_win(page):
     ids=["garbage", "junk", "empty"],
 )
 @pytest.mark.slow
-def test_a_draft_whose_mesh_cannot_be_drawn_is_not_saved(page, file, content):
+def test_a_draft_whose_shape_cannot_be_drawn_is_not_saved(page, file, content):
     draft = page.draft(name="unreadable")
     draft["files"][file] = page.upload(content)
     draft["description"]["base"] = {"mesh": file}
@@ -373,7 +373,7 @@ def test_a_robot_of_the_sites_own_name_is_not_started(page):
 
 
 @pytest.mark.slow
-def test_a_robot_whose_mesh_cannot_be_read_is_not_started(page):
+def test_a_robot_whose_shape_cannot_be_read_is_not_started(page):
     assert page.post("/save", page.draft(name="torn")).status == 200
     (page.folder / "robots" / "torn" / "meshes" / "base.wrl").write_bytes(TRIANGLE[:-9])
     answer = page.post("/start", {"name": "torn"})

@@ -355,7 +355,7 @@ def test_the_console_reads_no_urdf_itself_to_list_a_robot(mesh, tmp_path):
     with defining(mesh, tmp_path) as page:
         robot = tmp_path / "robots" / "outside"
         robot.mkdir(parents=True)
-        (tmp_path / "arm.urdf").write_text(to_urdf(load("puma560"), mesh_uri=lambda link: f"{link}.stl"))
+        (tmp_path / "arm.urdf").write_text(to_urdf(load("puma560"), shape_uri=lambda link: f"{link}.stl"))
         (robot / "robot.toml").write_text('name = "outside"\nurdf = "../arm.urdf"\n')
 
         def joints():

@@ -49,10 +49,10 @@ async def robot_session(mesh, robot="arm"):
     """Open a session that acts as a robot's services, with presence and meshes."""
     async with open_session(mesh) as session:
 
-        async def mesh_of(_):
+        async def shape_of(_):
             return GLB
 
-        session.answer("hall", robot, "mesh/*", mesh_of)
+        session.answer("hall", robot, "mesh/*", shape_of)
         session.declare_presence("hall", robot, "gateway")
         yield session
 
@@ -116,7 +116,7 @@ def test_last_joints_are_not_shown_and_a_last_controller_state_keeps_its_time(me
     run(main())
 
 
-def test_the_description_of_all_robots_names_meshes_that_can_be_fetched(mesh):
+def test_the_description_of_all_robots_names_shapes_that_can_be_fetched(mesh):
     async def main():
         async with (
             robot_session(mesh) as robot,

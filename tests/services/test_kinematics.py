@@ -135,7 +135,7 @@ def states_of(positions) -> JointStates:
     return message
 
 
-def test_the_description_names_meshes_that_are_served_as_glb(mesh):
+def test_the_description_names_shapes_that_are_served_as_glb(mesh):
     async def main():
         async with kinematics_service(mesh) as session:
             description = await last_value(session, "robomesh/hall/arm/description")

@@ -94,7 +94,7 @@ async def until(session, topic, predicate):
     raise AssertionError("the subscription ended")
 
 
-def test_the_description_lists_the_cells_fixtures_and_their_meshes_are_served(mesh):
+def test_the_description_lists_the_cells_fixtures_and_their_shapes_are_served(mesh):
     async def main():
         async with cell_service(mesh) as (_, monitor):
             for robot in ("left", "right"):

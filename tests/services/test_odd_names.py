@@ -102,7 +102,7 @@ def site_settings(folder: Path) -> dict:
             renderer.service.serve,
             renderer.service.Settings(site=SITE, size=(160, 90), folder=folder / "views"),
         ),
-        "ros2": (ros2.serve, ros2.Settings(site=SITE, meshes=folder / "meshes")),
+        "ros2": (ros2.serve, ros2.Settings(site=SITE, shapes=folder / "meshes")),
     }
 
 

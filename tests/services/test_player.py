@@ -126,26 +126,26 @@ def test_a_recorders_file_is_replayed_unchanged(mesh, tmp_path):
     assert played.items() <= put.items()
 
 
-def test_a_late_joiner_gets_the_replays_description_events_and_meshes(mesh, folder):
+def test_a_late_joiner_gets_the_replays_description_events_and_shapes(mesh, folder):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, paused=True, position_s=2.5)
             robot = f"robomesh/site/{state.robot}"
             description = await last_value(session, f"{robot}/description")
             events = await last_value(session, f"{robot}/events")
-            mesh_bytes = await session.ask_bytes(f"{robot}/mesh/base")
+            shape_bytes = await session.ask_bytes(f"{robot}/mesh/base")
             with refused(codes.RECORDING_NO_ATTACHMENT, name="mesh/none", attachments="mesh/base"):
                 await session.ask_bytes(f"{robot}/mesh/none", timeout_s=8.0)
             alive = {(each.robot, each.service) for each in await session.present()}
             assert (state.robot, "player") in alive
-            return state, description, events, mesh_bytes
+            return state, description, events, shape_bytes
 
-    state, description, events, mesh_bytes = run(main())
+    state, description, events, shape_bytes = run(main())
     assert (description.title, description.cell) == ("Pt600", "")
     assert f"replay-{description.replay.id}" == state.robot
     assert (description.replay.robot, description.replay.file) == ("arm", "trial.mcap")
     assert [event.code for event in events.events] == ["second.0", "second.1", "second.2"]
-    assert mesh_bytes == b"glTF of the base"
+    assert shape_bytes == b"glTF of the base"
     assert state.duration_s == pytest.approx(3.99)
 
 

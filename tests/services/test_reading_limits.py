@@ -32,7 +32,7 @@ def test_a_command_that_takes_too_much_memory_ends_with_one_line() -> None:
         "import sys\n"
         "from services.command_line import main\n"
         "from robots.shapes.files import read\n"
-        "read.read_mesh = lambda *_, **__: bytearray(2 << 30)\n"
+        "read.read_geometry = lambda *_, **__: bytearray(2 << 30)\n"
         "main.limit = lambda *words, given=main.limit: given(*words, most_bytes=1 << 30)\n"
         "sys.argv = ['robomesh', 'mesh', 'info', 'x.stl']\n"
         "main.main()\n"

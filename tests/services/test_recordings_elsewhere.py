@@ -46,10 +46,10 @@ async def record(mesh, folder):
             for name in ("joints", "frames", "video/front", "video/top", "description", "image/far")
         }
 
-        async def mesh_of(_):
+        async def shape_of(_):
             return GLB
 
-        session.answer("site", "arm", "mesh/*", mesh_of)
+        session.answer("site", "arm", "mesh/*", shape_of)
         description = schema.Description(name="arm", urdf=URDF, robot_toml='name = "arm"')
         description.links.add(name="base", mesh="base", mesh_sha256="00")
         description.links.add(name="column")

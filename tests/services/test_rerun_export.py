@@ -110,7 +110,7 @@ def test_a_recording_without_frames_gets_them_from_its_joints(swinging, tmp_path
         assert turned == pytest.approx(placement[:3, :3], abs=1e-6)
 
 
-def test_meshes_are_attached_to_their_links_with_z_up(swinging, tmp_path):
+def test_shapes_are_attached_to_their_links_with_z_up(swinging, tmp_path):
     found = export(swinging, tmp_path / "out.rrd", "--to", "0")
     for name in ("base", "forearm"):
         link = found[f"/site/arm/links/{name}"]
@@ -119,7 +119,7 @@ def test_meshes_are_attached_to_their_links_with_z_up(swinging, tmp_path):
         assert pytest.approx(y_to_z_up) == np.array(link["Transform3D:mat3x3"][0]).reshape(3, 3).T
 
 
-def test_an_old_mesh_and_a_fixture_stand_upright(tmp_path, capsys):
+def test_an_old_shape_and_a_fixture_stand_upright(tmp_path, capsys):
     source = tmp_path / "old.mcap"
     description = schema.Description(name="arm")
     description.links.add(name="base", mesh="base", color="#ff8000")

@@ -98,7 +98,7 @@ def test_an_imported_vrml_robot_keeps_its_placement(tmp_path: Path) -> None:
     np.testing.assert_allclose(after[0]["L1"][:3, 3], [0, 0, 0.5], atol=1e-12)
 
 
-def test_an_imported_library_robot_includes_its_meshes(tmp_path: Path) -> None:
+def test_an_imported_library_robot_includes_its_shapes(tmp_path: Path) -> None:
     assert run(["robot", "import", "pt500", str(tmp_path / "mine")]) == 0
     assert load(tmp_path / "mine").model_dump() == load("pt500").model_dump()
 
@@ -130,7 +130,7 @@ def test_check_of_a_missing_file_ends_with_status_2(capsys: pytest.CaptureFixtur
     assert "none/robot.toml: cannot be read" in capsys.readouterr().err
 
 
-def test_export_does_not_overwrite_another_robots_meshes(
+def test_export_does_not_overwrite_another_robots_shapes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["robot", "export", "pt600", str(tmp_path / "out")]) == 0
@@ -141,7 +141,7 @@ def test_export_does_not_overwrite_another_robots_meshes(
     assert run(["robot", "export", "pt600", str(tmp_path / "out")]) == 0
 
 
-def test_check_reads_every_mesh_and_prints_file_and_problem(
+def test_check_reads_every_shape_and_prints_file_and_problem(
     arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     robot = tmp_path / "robot.toml"
@@ -228,7 +228,7 @@ def test_four_views_are_one_picture(tmp_path: Path) -> None:
             assert 0.003 < orange[rows, columns].mean() < 0.5
 
 
-def test_an_exported_urdf_names_existing_meshes(arm: Path, tmp_path: Path) -> None:
+def test_an_exported_urdf_names_existing_shapes(arm: Path, tmp_path: Path) -> None:
     robot = tmp_path / "robot.toml"
     robot.write_text('name = "two"\nurdf = "two.urdf"\npackages = ["packages"]\n')
     assert run(["robot", "export", str(robot), str(tmp_path / "export")]) == 0

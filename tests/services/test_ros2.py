@@ -73,7 +73,7 @@ def tools(router):
 @asynccontextmanager
 async def bridge(mesh, folder, **settings):
     async with open_session(mesh) as session:
-        task = asyncio.create_task(serve(session, Settings(meshes=folder, **settings)))
+        task = asyncio.create_task(serve(session, Settings(shapes=folder, **settings)))
         try:
             yield
             assert not task.done()
@@ -87,10 +87,10 @@ async def robot_session(mesh, robot="arm"):
     """Open a session that publishes as a robot's services."""
     async with open_session(mesh) as session:
 
-        async def mesh_of(_):
+        async def shape_of(_):
             return GLB
 
-        session.answer("hall", robot, "mesh/*", mesh_of)
+        session.answer("hall", robot, "mesh/*", shape_of)
         yield session
 
 
@@ -184,7 +184,7 @@ def test_frames_are_published_as_tf_in_the_sites_frame(mesh, tools, tmp_path):
     run(main())
 
 
-def test_late_subscribers_get_the_description_of_all_robots_with_mesh_files(mesh, tools, tmp_path):
+def test_late_subscribers_get_the_description_of_all_robots_with_shape_files(mesh, tools, tmp_path):
 
     async def main():
         sha256 = hashlib.sha256(GLB).hexdigest()

@@ -9,8 +9,8 @@ import pytest
 from robots.collision import build_cell, distances, outside_clearance, unshaped
 from robots.descriptions import description
 from robots.descriptions.cells import CellDescription, Floor
-from robots.descriptions.glb import link_mesh
-from robots.shapes.mesh import bounds
+from robots.descriptions.glb import link_geometry
+from robots.shapes.geometry import bounds
 from services.cells.descriptions import cells_of
 from services.errors import SiteFileError
 from services.site_file import site
@@ -48,7 +48,7 @@ def test_motions_are_warned_of_unless_the_file_says_otherwise(tmp_path):
     ],
 )
 def test_a_fixtures_middle_is_at_its_pose_and_it_is_never_too_small(shape, low, high):
-    mesh = link_mesh([fixture_shape(Fixture(cell="a", name="x", **shape))])
+    mesh = link_geometry([fixture_shape(Fixture(cell="a", name="x", **shape))])
     lowest, highest = bounds(mesh)
     assert lowest == pytest.approx(low, rel=0.005)
     assert highest == pytest.approx(high, rel=0.005)
@@ -60,14 +60,14 @@ def test_a_fixtures_middle_is_at_its_pose_and_it_is_never_too_small(shape, low, 
         assert heights.min() >= 0.1 - 1e-9
 
 
-def test_a_fixtures_mesh_is_taken_from_the_files_own_folder_in_its_own_unit(tmp_path):
+def test_a_fixtures_shape_is_taken_from_the_files_own_folder_in_its_own_unit(tmp_path):
     (tmp_path / "post.wrl").write_text(
         "#VRML V2.0 utf8\nShape { geometry IndexedFaceSet { coord Coordinate { "
         "point [0 0 0, 2 0 0, 0 3 0] } coordIndex [0 1 2 -1] } }\n"
     )
     text = f'{IN_A}[[fixture]]\ncell = "a"\nname = "post"\nmesh = "post.wrl"\nmesh_scale = 0.01\n'
     (fixture,) = load(tmp_path, text).fixture
-    _, highest = bounds(link_mesh([fixture_shape(fixture)]))
+    _, highest = bounds(link_geometry([fixture_shape(fixture)]))
     assert highest == pytest.approx((0.02, 0.03, 0.0))
 
 
@@ -209,7 +209,7 @@ HALF = (
 )
 
 
-def test_a_robot_cannot_require_checks_beside_one_whose_meshes_are_missing(tmp_path):
+def test_a_robot_cannot_require_checks_beside_one_whose_shapes_are_missing(tmp_path):
     (tmp_path / "half.urdf").write_text(HALF)
     half = '[[robot]]\nname = "half"\nmodel = "half.urdf"\n'
     whole = '[[robot]]\nname = "arm"\nmodel = "pt600"\ncheck = "require"\n'

@@ -496,7 +496,7 @@ def test_bad_input_is_one_line_that_names_it_and_exit_status_2(tmp_path):
         ("list", "--connect", "nonsense"): "nonsense",
         ("monitor", "arm", "--connect", router): "no router",
         ("send", "arm", "jump"): "jump",
-        ("mesh", "info", str(mesh)): "base.wrl",
+        ("shapes", "info", str(mesh)): "base.wrl",
         ("simulate", "--listen", "nowhere"): "nowhere",
         ("simulate", "--robot", "pt6000"): "pt6000",
         ("robot", "show", "pt6000"): "pt6000",

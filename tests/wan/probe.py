@@ -112,7 +112,7 @@ class Probe:
         self._readers.append(asyncio.create_task(put()))
         return True
 
-    async def hold_mesh(self, site: str, robot: str, size: int) -> str:
+    async def hold_shape(self, site: str, robot: str, size: int) -> str:
         """Answer for meshes of that many equal bytes; return their SHA-256."""
         mesh = random.randbytes(size)
 

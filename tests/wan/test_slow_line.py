@@ -9,10 +9,10 @@ pytestmark = pytest.mark.processes
 
 VIDEO = "robomesh/plant/arm/video/free"
 MESH = "robomesh/plant/arm/mesh/base"
-MESH_BYTES = 250_000
+SHAPE_BYTES = 250_000
 
 
-def test_a_mesh_arrives_whole_beside_more_video_than_the_line_carries(tmp_path):
+def test_a_shape_arrives_whole_beside_more_video_than_the_line_carries(tmp_path):
     if why := missing():
         pytest.skip(why)
     with Network() as network:
@@ -23,7 +23,7 @@ def test_a_mesh_arrives_whole_beside_more_video_than_the_line_carries(tmp_path):
         for site in (hub, plant):
             site.start("router")
         beside, away = Probe(plant.host), Probe(hub.host)
-        sha256 = beside.do("hold_mesh", "plant", "arm", MESH_BYTES)
+        sha256 = beside.do("hold_mesh", "plant", "arm", SHAPE_BYTES)
         beside.do("pour", "plant", "arm", "free", 8.0, 30.0)
         away.do("watch", VIDEO)
         away.wait_for("samples", VIDEO)

@@ -37,7 +37,7 @@ class UrdfRobot:
     Attributes:
         name: The name in the file.
         notes: Irregularities and how they were handled, a sentence each.
-        missing: Mesh files that were not found, as named in the URDF.
+        missing: Shape files that were not found, as named in the URDF.
         unchecked: Missing files that a collision check would use.
         ignored: Pairs of links that an SRDF excludes from checks, and the SRDF's file name.
     """

@@ -9,7 +9,7 @@ from robots.descriptions.urdf.files import Resolve, is_exact
 from robots.descriptions.urdf.values import WrongElement, numbers, origin
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.poses import FloatArray
-from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.geometry import Geometry, Material, Part
 from robots.shapes.normals import creased
 from robots.shapes.solids import Solid, ball, box, turned
 
@@ -24,7 +24,7 @@ class Shapes:
     """The state of reading the shapes of one URDF.
 
     Attributes:
-        missing: Mesh files that were not found, as named in the file.
+        missing: Shape files that were not found, as named in the file.
         unchecked: Missing files that a collision check would use.
         notes: Irregularities and how they were handled, a sentence each.
     """
@@ -71,7 +71,7 @@ class Shapes:
             paint = _paint(material) or self._paints.get(material.get("name", ""))
             color, opacity = paint or (None, None)
         if found.tag == "mesh":
-            shape = self._mesh(found, what, placement, color, opacity)
+            shape = self._file_shape(found, what, placement, color, opacity)
             if shape is None and checked:
                 self.unchecked.append(found.get("filename", ""))
             return shape
@@ -80,10 +80,10 @@ class Shapes:
             self.notes.append(f"{what}: shape {found.tag} is not supported; left out")
             return None
         vertices, normals, triangles = creased(*solid, pi / 6)
-        mesh = Mesh(parts=(Part("", Material(), vertices, normals, triangles),))
-        return Shape(mesh, placement, color, opacity)
+        part = Part("", Material(), vertices, normals, triangles)
+        return Shape(Geometry((part,)), placement, color, opacity)
 
-    def _mesh(
+    def _file_shape(
         self,
         element: Xml.Element,
         what: str,
@@ -113,10 +113,10 @@ def _same(one: Shape, other: Shape) -> bool:
     """Return whether two shapes have the same geometry; colours may differ."""
     if not np.array_equal(one.shape_to_link, other.shape_to_link):
         return False
-    if isinstance(one.mesh, Mesh) and isinstance(other.mesh, Mesh):
-        (one_part,), (other_part,) = one.mesh.parts, other.mesh.parts
+    if isinstance(one.source, Geometry) and isinstance(other.source, Geometry):
+        (one_part,), (other_part,) = one.source.parts, other.source.parts
         return np.array_equal(one_part.vertices, other_part.vertices)
-    return one.mesh == other.mesh
+    return one.source == other.source
 
 
 def _paint(material: Xml.Element) -> _Paint | None:

@@ -1,4 +1,4 @@
-"""One URDF of all robots, for external viewers: links have the names of the frames, meshes have addresses.
+"""One URDF of all robots, for external viewers: links have the names of the frames, shapes have addresses.
 
 Works on the URDF text only, without kinematics.
 """
@@ -10,7 +10,7 @@ from typing import Literal
 
 from robomesh.recordings.series.values import fixed_angles
 
-MeshUri = Callable[[str], str | None]
+ShapeUri = Callable[[str], str | None]
 
 # The frame above the frames of several sites.
 WORLD = "robomesh"
@@ -25,8 +25,8 @@ class Fixture:
 
     Attributes:
         pose: Fixture to site, 16 numbers by rows.
-        uri: Address of the mesh; None: no mesh.
-        color: "r g b a", each 0 to 1; empty: the mesh's own.
+        uri: Address of the shape; None: no shape.
+        color: "r g b a", each 0 to 1; empty: the shape's own.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Viewed:
     Attributes:
         urdf: The URDF of its description, with links without a prefix.
         base_to_site: 16 numbers by rows.
-        mesh_uri: Returns the address of a link's mesh by the link's name, or None without a mesh.
+        shape_uri: Returns the address of a link's shape by the link's name, or None without a shape.
         fixtures: Fixtures of its cell, the same for all robots of the cell.
         floor_m: Height of its cell's floor in the site's frame [m]; None: no floor.
     """
@@ -51,13 +51,13 @@ class Viewed:
     robot: str
     urdf: str
     base_to_site: Sequence[float]
-    mesh_uri: MeshUri
+    shape_uri: ShapeUri
     fixtures: tuple[Fixture, ...] = ()
     floor_m: float | None = None
 
 
-def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, prefix_joints: bool = False) -> Xml.Element:
-    """Return a URDF with prefixed link names, in which each link shows its mesh only, in its colour.
+def prefixed(urdf: str, prefix: str, shape_uri: ShapeUri, *, prefix_joints: bool = False) -> Xml.Element:
+    """Return a URDF with prefixed link names, in which each link shows its shape only, in its colour.
 
     Args:
         prefix: Prefix of the links, `<site>/<robot>/`.
@@ -76,7 +76,7 @@ def prefixed(urdf: str, prefix: str, mesh_uri: MeshUri, *, prefix_joints: bool =
         color = link.find("visual/material/color")
         for shape in (*link.findall("visual"), *link.findall("collision")):
             link.remove(shape)
-        _show(link, mesh_uri(name), "" if color is None else color.get("rgba", ""))
+        _show(link, shape_uri(name), "" if color is None else color.get("rgba", ""))
     for end in (*root.iter("parent"), *root.iter("child")):
         end.set("link", prefix + end.get("link", ""))
     if prefix_joints:
@@ -124,7 +124,7 @@ def together(robots: Iterable[Viewed], *, joints: Literal["prefixed", "plain", "
     for robot in known:
         prefix = f"{robot.site}/{robot.robot}/"
         try:
-            root = prefixed(robot.urdf, prefix, robot.mesh_uri, prefix_joints=joints == "prefixed")
+            root = prefixed(robot.urdf, prefix, robot.shape_uri, prefix_joints=joints == "prefixed")
         except ValueError:
             continue
         if joints == "none":

@@ -17,33 +17,33 @@ from robots.kinematics.joints import joints_of
 from robots.kinematics.kinematic_tree import BASE, Tree, TreeJoint, TreeLink, named_frames, tree_of
 from robots.schema.poses import FloatArray, inverse, rotation_rpy
 from robots.schema.robot_toml import JointType, RobotDescription
-from robots.shapes.mesh import Color
+from robots.shapes.geometry import Color
 
 
 def glb_beside(link: str) -> str:
-    """Return the path of a link's mesh in the folder meshes next to the URDF."""
+    """Return the path of a link's shape in the folder meshes next to the URDF."""
     return f"meshes/{link}.glb"
 
 
 def collision_beside(link: str) -> str:
-    """Return the path of a link's collision mesh in the folder meshes next to the URDF."""
+    """Return the path of a link's collision shape in the folder meshes next to the URDF."""
     return f"meshes/{link}_collision.glb"
 
 
 def to_urdf(
     description: RobotDescription,
     *,
-    mesh_uri: Callable[[str], str] = glb_beside,
+    shape_uri: Callable[[str], str] = glb_beside,
     collision_uri: Callable[[str], str] | None = None,
     colors: Mapping[str, Color] | None = None,
 ) -> str:
-    """Return a description as URDF text that refers to the meshes of `robots.descriptions.glb.link_meshes`.
+    """Return a description as URDF text that refers to the shapes of `robots.descriptions.glb.link_glbs`.
 
     Limits and speeds are the description's, which may be tighter than those of its URDF.
 
     Args:
-        mesh_uri: Returns the address of a link's GLB by the link's name.
-        collision_uri: The same for the GLB of `glb.collision_meshes`; None: `mesh_uri` for both.
+        shape_uri: Returns the address of a link's GLB by the link's name.
+        collision_uri: The same for the GLB of `glb.collision_glbs`; None: `shape_uri` for both.
         colors: Colours of links, sRGB: Foxglove's viewer ignores those of GLB.
     """
     tree = tree_of(description)
@@ -53,14 +53,14 @@ def to_urdf(
     ):
         tree = _with_limits(tree, number, float(lower), float(upper), float(speed))
     frames = named_frames(description)
-    return tree_urdf(description.name, tree, frames, mesh_uri, collision_uri, colors=colors or {})
+    return tree_urdf(description.name, tree, frames, shape_uri, collision_uri, colors=colors or {})
 
 
 def tree_urdf(
     name: str,
     tree: Tree,
     frames: Mapping[str, tuple[str, FloatArray]] | None = None,
-    mesh_uri: Callable[[str], str] = glb_beside,
+    shape_uri: Callable[[str], str] = glb_beside,
     collision_uri: Callable[[str], str] | None = collision_beside,
     *,
     colors: Mapping[str, Color] = MappingProxyType({}),
@@ -69,7 +69,7 @@ def tree_urdf(
 
     Args:
         frames: Named frames without a link: the link that carries each, and its (4, 4) pose there [m].
-        mesh_uri: Returns the address of the GLB of a link with a shape, by the link's name.
+        shape_uri: Returns the address of the GLB of a link with a shape, by the link's name.
         collision_uri, colors: See `to_urdf`.
     """
     robot = Xml.Element("robot", name=name)
@@ -93,7 +93,7 @@ def tree_urdf(
         if joint is not None:
             _add_joint(robot, tree, joint, carriers[joint.parent], carrier)
         for link in here:
-            _add_link(robot, link, mesh_uri, collision_uri or mesh_uri, colors.get(link.name))
+            _add_link(robot, link, shape_uri, collision_uri or shape_uri, colors.get(link.name))
             if link.name != carrier:
                 on, on_to_joint = carriers.get(number, (carrier, np.eye(4)))
                 _add_fixed(robot, on, link.name, inverse(on_to_joint) @ link.link_to_joint, taken_joints)
@@ -128,12 +128,12 @@ def _unused(name: str, taken: set[str]) -> str:
 def _add_link(
     robot: Xml.Element,
     link: TreeLink,
-    mesh_uri: Callable[[str], str],
+    shape_uri: Callable[[str], str],
     collision_uri: Callable[[str], str],
     color: Color | None,
 ) -> None:
     element = Xml.SubElement(robot, "link", name=link.name)
-    uses = {"visual": mesh_uri, "collision": collision_uri if link.collision else mesh_uri}
+    uses = {"visual": shape_uri, "collision": collision_uri if link.collision else shape_uri}
     for use, address in uses.items() if link.shapes else ():
         shape = Xml.SubElement(element, use)
         Xml.SubElement(Xml.SubElement(shape, "geometry"), "mesh", filename=address(link.name))

@@ -1,4 +1,4 @@
-"""The sizes, units and names that a mesh file declares, read before a library reads the file.
+"""The sizes, units and names that a shape file declares, read before a library reads the file.
 
 A count that the file cannot hold is rejected before memory is allocated for it. The unit, the upward
 axis and the names of textures and of other files are kept here, because the libraries drop them.
@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.xml_text import XmlError, xml_text
 from robots.shapes.files.text_repair import check_instances, counted_from_first, plain_text
 
 # A robot's link is far smaller. The console reads uploaded files, so the limits must be firm.
 MAX_BYTES = 1 << 30
-# trimesh makes a mesh for each material, which takes milliseconds.
+# trimesh makes a shape for each material, which takes milliseconds.
 _MOST_MATERIALS = 2000
 
 
@@ -47,7 +47,7 @@ def read_declared(path: Path, kind: str) -> Declared:
     """Return the properties that a file of this kind ("ply") declares.
 
     Raises:
-        MeshError: If the file cannot be opened, is too large, or declares more than it can hold.
+        ShapeError: If the file cannot be opened, is too large, or declares more than it can hold.
     """
     data = content(path)
     reader = _READERS.get(kind)
@@ -58,17 +58,17 @@ def content(path: Path) -> bytes:
     """Return a file's bytes.
 
     Raises:
-        MeshError: If it cannot be read, is empty, or is larger than MAX_BYTES.
+        ShapeError: If it cannot be read, is empty, or is larger than MAX_BYTES.
     """
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
-            raise MeshError(path, f"has {size >> 20} MiB; at most {MAX_BYTES >> 20} MiB are read")
+            raise ShapeError(path, f"has {size >> 20} MiB; at most {MAX_BYTES >> 20} MiB are read")
         data = path.read_bytes()
     except OSError as error:
-        raise MeshError(path, f"cannot be read: {error.strerror}") from error
+        raise ShapeError(path, f"cannot be read: {error.strerror}") from error
     if not data:
-        raise MeshError(path, "is empty")
+        raise ShapeError(path, "is empty")
     return data
 
 
@@ -76,7 +76,7 @@ def _stl(path: Path, data: bytes) -> Declared:
     if len(data) >= 84 and data[:5].lower() != b"solid":
         (count,) = struct.unpack_from("<I", data, 80)
         if 84 + 50 * count > len(data):
-            raise MeshError(
+            raise ShapeError(
                 path,
                 f"declares {count} triangles, which take {50 * count} bytes; {len(data) - 84} follow",
                 place="byte 80",
@@ -91,7 +91,7 @@ _SIZES |= {"int": 4, "uint": 4, "float": 4, "int32": 4, "uint32": 4, "float32": 
 def _ply(path: Path, data: bytes) -> Declared:
     end = data.find(b"end_header")
     if not data.startswith(b"ply") or end < 0:
-        raise MeshError(path, "is not a PLY file: one begins with 'ply' and has a line 'end_header'")
+        raise ShapeError(path, "is not a PLY file: one begins with 'ply' and has a line 'end_header'")
     needed = 0
     text = b"format ascii" in data[:end]
     count = 0
@@ -99,7 +99,7 @@ def _ply(path: Path, data: bytes) -> Declared:
         words = line.split()
         if words[:1] == ["element"]:
             if len(words) != 3 or not (words[2].isascii() and words[2].isdigit()):
-                raise MeshError(
+                raise ShapeError(
                     path, f"{line!r} must have the form 'element vertex 8'", place=f"line {number}"
                 )
             count = int(words[2])
@@ -107,7 +107,7 @@ def _ply(path: Path, data: bytes) -> Declared:
             # A list takes at least the bytes of its count; a number in text takes a digit and a blank.
             needed += count * (2 if text else _SIZES.get(words[1] if words[1] != "list" else words[2], 1))
             if needed - 2 > len(data) - end:
-                raise MeshError(
+                raise ShapeError(
                     path,
                     f"declares {count} rows; only {len(data) - end} bytes follow",
                     place=f"line {number}",
@@ -156,7 +156,7 @@ def _check_obj_numbers(path: Path, text: str) -> None:
     """Reject a face with a vertex number far above the count: trimesh would allocate up to that number.
 
     Raises:
-        MeshError: If there is one.
+        ShapeError: If there is one.
     """
     count = len(re.findall(r"(?m)^[ \t]*v[nt]?[ \t]", text))
     digits = len(str(count)) + 1
@@ -164,7 +164,9 @@ def _check_obj_numbers(path: Path, text: str) -> None:
     if found is not None:
         line = text.count("\n", 0, found.start(1)) + 1
         number = found[1][:20]
-        raise MeshError(path, f"a face uses vertex {number}; there are at most {count}", place=f"line {line}")
+        raise ShapeError(
+            path, f"a face uses vertex {number}; there are at most {count}", place=f"line {line}"
+        )
 
 
 def below(path: Path, address: str) -> Path | None:
@@ -201,12 +203,12 @@ def _dae(path: Path, data: bytes) -> Declared:
     try:
         text, notes = xml_text(data)
     except XmlError as error:
-        raise MeshError(path, str(error)) from None
+        raise ShapeError(path, str(error)) from None
     data = text.encode()
     if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
-        raise MeshError(path, "has a DOCTYPE or ENTITY, which can expand without limit; remove it")
+        raise ShapeError(path, "has a DOCTYPE or ENTITY, which can expand without limit; remove it")
     if b"COLLADA" not in data[:4096]:
-        raise MeshError(path, "is not a COLLADA file: the first element must be COLLADA")
+        raise ShapeError(path, "is not a COLLADA file: the first element must be COLLADA")
     unit = re.search(rb"<unit\b[^<>]*\bmeter\s*=\s*[\"']\s*([-+0-9.eE]+)", data)
     axis = re.search(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>", data)
     try:

@@ -1,6 +1,6 @@
 """DXF reader: the model space of a file that ezdxf has parsed, with blocks expanded.
 
-    3DFACE, SOLID, TRACE, POLYLINE (polyface, polygon mesh), MESH     triangles
+    3DFACE, SOLID, TRACE, POLYLINE (polyface, polygon shape), MESH     triangles
     LINE, LWPOLYLINE, POLYLINE, CIRCLE, ARC, ELLIPSE, SPLINE, POINT   wires
     INSERT                                                            its block, once per row and column
     3DSOLID, BODY, REGION, SURFACE                                    named in a warning: they are ACIS
@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.declared_size import content
-from robots.shapes.mesh import Color, FloatArray, IndexArray, Material, Mesh, Part, Wire, welded
+from robots.shapes.geometry import Color, FloatArray, Geometry, IndexArray, Material, Part, Wire, welded
 from robots.shapes.normals import creased
 from robots.shapes.polygons import Effort, ears
 
@@ -73,18 +73,18 @@ class _Found:
         """Count points of a block's copy.
 
         Raises:
-            MeshError: If there are too many.
+            ShapeError: If there are too many.
         """
         self.copied_points += points
         if self.copied_points > MAX_COPIED_POINTS:
-            raise MeshError(path, f"copies of blocks have more than {MAX_COPIED_POINTS} points")
+            raise ShapeError(path, f"copies of blocks have more than {MAX_COPIED_POINTS} points")
 
 
-def read_dxf(path: Path) -> Mesh:
+def read_dxf(path: Path) -> Geometry:
     """Return the faces, lines and points of a .dxf file, in the file's units and axes.
 
     Raises:
-        MeshError: If it is not a DXF file, or is too damaged for ezdxf to recover.
+        ShapeError: If it is not a DXF file, or is too damaged for ezdxf to recover.
     """
     size_bytes = len(content(path))
     try:
@@ -99,25 +99,25 @@ def read_dxf(path: Path) -> Mesh:
         wires = [_lines(appearance, runs) for appearance, runs in found.lines.items()]
         wires += [_points(appearance, points) for appearance, points in found.points.items()]
         units = int(drawing.header.get("$INSUNITS", 0) or 0)
-    except MeshError:
+    except ShapeError:
         raise
     except MemoryError as error:
-        raise MeshError(path, "needs more memory than is available") from error
+        raise ShapeError(path, "needs more memory than is available") from error
     # ezdxf raises arbitrary exceptions for damaged files.
     except Exception as error:
         first = next(iter(str(error).splitlines()), "")[:200]
-        raise MeshError(path, f"cannot be read as DXF: {first or type(error).__name__}") from error
+        raise ShapeError(path, f"cannot be read as DXF: {first or type(error).__name__}") from error
     shapes: list[Part | Wire] = [*parts, *wires]
     for shape in shapes:
         if not np.isfinite(shape.vertices).all():
-            raise MeshError(path, f"layer {shape.name!r} has a point with a non-finite coordinate")
+            raise ShapeError(path, f"layer {shape.name!r} has a point with a non-finite coordinate")
     warnings += _left_out(found.left_out)
     warnings += [f"{what} left out: {reason}" for what, reason in found.broken.items()]
     if effort.spent:
         warnings.append("concave faces take too long to triangulate; some are drawn beyond their outline")
     if not shapes:
         warnings.append("has no shape that can be drawn")
-    return Mesh(
+    return Geometry(
         tuple(part for part in parts if len(part.triangles)),
         tuple(wires),
         warnings=tuple(warnings),
@@ -173,14 +173,14 @@ def _left_out(counts: Counter[str]) -> list[str]:
 def _walk(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Found, depth: int) -> None:
     found.entities += 1
     if found.entities > MAX_ENTITIES:
-        raise MeshError(path, f"draws more than {MAX_ENTITIES} entities, with blocks expanded")
+        raise ShapeError(path, f"draws more than {MAX_ENTITIES} entities, with blocks expanded")
     if depth > MAX_DEPTH:
-        raise MeshError(
+        raise ShapeError(
             path, f"INSERT {entity.dxf.name!r} is nested deeper than {MAX_DEPTH}, or contains itself"
         )
     try:
         _draw(path, drawing, entity, above, found, depth)
-    except (MeshError, MemoryError, RecursionError):
+    except (ShapeError, MemoryError, RecursionError):
         raise
     # ezdxf raises arbitrary exceptions; one broken entity must not make the whole file unreadable.
     except Exception as error:
@@ -219,7 +219,7 @@ def _draw(path: Path, drawing: Any, entity: Any, above: _Appearance, found: _Fou
         size = max(_size(corners), 1e-9)
         # `flattening` bisects until it is close enough, which never ends for a non-finite point.
         if not np.isfinite(size):
-            raise MeshError(
+            raise ShapeError(
                 path, f"{kind} on layer {appearance.layer!r} has a point with a non-finite coordinate"
             )
         found.lines.setdefault(appearance, []).append(_array(curve.flattening(size / 200)))
@@ -253,7 +253,7 @@ def _copies(path: Path, insert: Any, found: _Found) -> Iterator[Any]:
     count = insert.dxf.row_count * insert.dxf.column_count if insert.mcount > 1 else 1
     found.copies += count
     if found.copies > MAX_COPIES:
-        raise MeshError(
+        raise ShapeError(
             path,
             f"INSERT {insert.dxf.name!r}: {found.copies} copies of blocks; at most {MAX_COPIES} are read",
         )

@@ -15,15 +15,15 @@ from urllib.parse import unquote
 import numpy as np
 
 from robomesh import bounded_json
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.declared_size import Declared, below, content, textures_below
-from robots.shapes.files.trimesh_formats import mesh_of, part_of
-from robots.shapes.mesh import (
+from robots.shapes.files.trimesh_formats import geometry_of, part_of
+from robots.shapes.geometry import (
     Y_UP_TO_Z_UP,
     FloatArray,
+    Geometry,
     IndexArray,
     Material,
-    Mesh,
     Part,
     Wire,
     normal_transform,
@@ -73,7 +73,7 @@ class Surface:
     material: dict[str, Any]
 
 
-def read_gltf(path: Path, *, kind: str = "") -> Mesh:
+def read_gltf(path: Path, *, kind: str = "") -> Geometry:
     """Return the content of a glTF or GLB file, in metres and in the file's axes.
 
     Files with its buffers must be in the same folder, or in folders of it.
@@ -82,21 +82,21 @@ def read_gltf(path: Path, *, kind: str = "") -> Mesh:
         kind: "glb" or "gltf"; the file's ending by default.
 
     Raises:
-        MeshError: If it is not such a file, lacks a file, or draws too much.
+        ShapeError: If it is not such a file, lacks a file, or draws too much.
     """
     data, binary = content(path), b""
     if (kind or path.suffix.lower().lstrip(".")) == "glb":
         document, binary = glb_chunks(data, path)
     else:
         document = _parsed(data, path)
-    return _consistent(path, lambda: _File(path, document, binary).mesh(path))
+    return _consistent(path, lambda: _File(path, document, binary).geometry(path))
 
 
 def read_glb(data: bytes) -> tuple[Surface, ...]:
     """Return the surfaces of published GLB, z up [m].
 
     Raises:
-        MeshError: If it is not GLB, is truncated, or has invalid content.
+        ShapeError: If it is not GLB, is truncated, or has invalid content.
     """
     document, binary = glb_chunks(data, _PUBLISHED)
     return _consistent(
@@ -109,7 +109,7 @@ def glb_to_z_up(data: bytes) -> FloatArray:
     """Return the (4, 4) rotation from a GLB's own axes, after its nodes' placements, to z up.
 
     Raises:
-        MeshError: If it is not GLB, or is truncated.
+        ShapeError: If it is not GLB, or is truncated.
     """
     document, _ = glb_chunks(data, _PUBLISHED)
     return _consistent(_PUBLISHED, lambda: _file_to_z_up(document))
@@ -119,15 +119,15 @@ def glb_chunks(data: bytes, source: str | Path) -> tuple[dict[str, Any], bytes]:
     """Return the JSON object of GLB and its binary chunk, which may be empty.
 
     Raises:
-        MeshError: If it is not GLB, or is truncated.
+        ShapeError: If it is not GLB, or is truncated.
     """
     if len(data) < 20 or data[:4] != b"glTF":
-        raise MeshError(source, "is not a GLB file: one begins with 'glTF'")
+        raise ShapeError(source, "is not a GLB file: one begins with 'glTF'")
     version, length, size, kind = struct.unpack_from("<IIII", data, 4)
     if version != 2:
-        raise MeshError(source, f"is glTF version {version}; only version 2 is read", place="byte 4")
+        raise ShapeError(source, f"is glTF version {version}; only version 2 is read", place="byte 4")
     if kind != JSON_CHUNK or 20 + size > len(data) or length > len(data):
-        raise MeshError(source, f"is truncated or damaged: declares {length} bytes, has {len(data)}")
+        raise ShapeError(source, f"is truncated or damaged: declares {length} bytes, has {len(data)}")
     document, after, binary = _parsed(data[20 : 20 + size], source), 20 + size, b""
     if after + 8 <= length:
         size, kind = struct.unpack_from("<II", data, after)
@@ -139,22 +139,22 @@ def _parsed(data: bytes, source: str | Path) -> dict[str, Any]:
     try:
         document = bounded_json.loads(data)
     except (ValueError, RecursionError) as error:
-        raise MeshError(source, f"its JSON is invalid: {error}") from error
+        raise ShapeError(source, f"its JSON is invalid: {error}") from error
     if not isinstance(document, dict):
-        raise MeshError(source, "its JSON is not an object")
+        raise ShapeError(source, "its JSON is not an object")
     return document
 
 
 def _consistent(source: str | Path, read: Callable[[], _Content]) -> _Content:
-    """Return what a function reads; JSON of another shape and values beyond their buffer are a MeshError."""
+    """Return what a function reads; JSON of another shape and values beyond their buffer are a ShapeError."""
     try:
         # An overflow becomes infinite, which is reported.
         with np.errstate(all="ignore"):
             return read()
     except MemoryError as error:
-        raise MeshError(source, "needs more memory than is available") from error
+        raise ShapeError(source, "needs more memory than is available") from error
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise MeshError(source, f"its content is inconsistent: {error!r}") from error
+        raise ShapeError(source, f"its content is inconsistent: {error!r}") from error
 
 
 def _axes(document: dict[str, Any]) -> tuple[str, bool]:
@@ -184,16 +184,16 @@ class _File:
         file = below(self._source, unquote(address)) if isinstance(self._source, Path) else None
         if file is None or not file.is_file():
             reason = f"buffer {address!r}: no such file in this folder"
-            raise MeshError(self._source, reason, missing=address)
+            raise ShapeError(self._source, reason, missing=address)
         self._files.append(file)
         return content(file)
 
-    def mesh(self, path: Path) -> Mesh:
+    def geometry(self, path: Path) -> Geometry:
         up, turned = _axes(self._document)
         textures = [self._texture(each) for each in self._document.get("materials", [])]
         files = (*self._files, *textures_below(path, filter(None, textures)))
         shapes = [self._shape(each) for each in self.surfaces(Y_UP_TO_Z_UP if turned else np.eye(4))]
-        return mesh_of(path, shapes, Declared(unit_m=1.0, up=up, files=files))
+        return geometry_of(path, shapes, Declared(unit_m=1.0, up=up, files=files))
 
     def surfaces(self, root: FloatArray) -> Iterator[Surface]:
         """Yield the surfaces, with the scene's nodes placed below a root."""
@@ -201,16 +201,16 @@ class _File:
         packed = [name for name in required if "draco" in name.lower() or "meshopt" in name.lower()]
         if packed:
             reason = f"is compressed with {', '.join(packed)}; export it without compression"
-            raise MeshError(self._source, reason)
+            raise ShapeError(self._source, reason)
         placed = list(self._meshes(root))
-        drawn = sum(self._drawn(mesh) for mesh, _ in placed)
+        drawn = sum(self._drawn(geometry) for geometry, _ in placed)
         if drawn > MAX_DRAWN:
             reason = f"draws {drawn} points and corners; at most {MAX_DRAWN} are read"
-            raise MeshError(self._source, reason)
-        for mesh, placement in placed:
-            for primitive in mesh["primitives"]:
+            raise ShapeError(self._source, reason)
+        for geometry, placement in placed:
+            for primitive in geometry["primitives"]:
                 if primitive.get("mode", TRIANGLES) in (POINTS, LINES, TRIANGLES, _STRIP):
-                    yield self._surface(str(mesh.get("name", "")), primitive, placement)
+                    yield self._surface(str(geometry.get("name", "")), primitive, placement)
 
     def _meshes(self, root: FloatArray) -> Iterator[tuple[dict[str, Any], FloatArray]]:
         nodes, scenes = self._document.get("nodes", []), self._document.get("scenes", [])
@@ -224,7 +224,7 @@ class _File:
             number, parent = waiting.pop()
             if number in seen:
                 reason = f"node {number} has two parents, or is its own ancestor"
-                raise MeshError(self._source, reason)
+                raise ShapeError(self._source, reason)
             seen.add(number)
             node = nodes[number]
             placement = parent @ _placement(node)
@@ -232,9 +232,9 @@ class _File:
                 yield self._document["meshes"][node["mesh"]], placement
             waiting += [(child, placement) for child in reversed(node.get("children", []))]
 
-    def _drawn(self, mesh: dict[str, Any]) -> int:
-        """Return the number of points and corners that a mesh draws."""
-        used = [(each["attributes"]["POSITION"], each.get("indices")) for each in mesh["primitives"]]
+    def _drawn(self, geometry: dict[str, Any]) -> int:
+        """Return the number of points and corners that a shape draws."""
+        used = [(each["attributes"]["POSITION"], each.get("indices")) for each in geometry["primitives"]]
         numbers = [number for pair in used for number in pair if number is not None]
         return sum(abs(int(self._document["accessors"][number]["count"])) for number in numbers)
 
@@ -243,13 +243,13 @@ class _File:
         linear = placement[:3, :3]
         vertices = self._values(attributes["POSITION"]) @ linear.T + placement[:3, 3]
         if not np.isfinite(vertices).all():
-            raise MeshError(self._source, f"{name!r} has a vertex with a non-finite coordinate")
+            raise ShapeError(self._source, f"{name!r} has a vertex with a non-finite coordinate")
         numbers = np.arange(len(vertices), dtype=np.int64)
         if "indices" in primitive:
             numbers = self._values(primitive["indices"]).astype(np.int64).ravel()
         if len(numbers) and not 0 <= numbers.min() <= numbers.max() < len(vertices):
             reason = f"{name!r} uses vertex {numbers.max()}; there are {len(vertices)}"
-            raise MeshError(self._source, reason)
+            raise ShapeError(self._source, reason)
         if mode == _STRIP:
             # Every second triangle of a strip is wound the other way.
             numbers = np.column_stack([numbers[:-2], numbers[1:-1], numbers[2:]])
@@ -289,14 +289,14 @@ class _File:
         if "bufferView" not in accessor:
             if not 0 <= count <= _MOST_ZEROS:
                 reason = f"an accessor's count is {count}; without data it must be 0 to {_MOST_ZEROS}"
-                raise MeshError(self._source, reason)
+                raise ShapeError(self._source, reason)
             return np.zeros((count, width))
         view = self._document["bufferViews"][accessor["bufferView"]]
         row = component.itemsize * width
         stride = view.get("byteStride", row)
         # With rows that overlap, a small file would have any number of them.
         if stride < row:
-            raise MeshError(self._source, f"rows of {row} bytes are {stride} bytes apart")
+            raise ShapeError(self._source, f"rows of {row} bytes are {stride} bytes apart")
         start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         data = self._buffers[view.get("buffer", 0)]
         steps = (stride, component.itemsize)

@@ -1,4 +1,4 @@
-"""Choice of a mesh file's reader by its content, or by its ending where the content is ambiguous."""
+"""Choice of a shape file's reader by its content, or by its ending where the content is ambiguous."""
 
 import inspect
 from collections.abc import Callable, Mapping
@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.dxf import read_dxf
 from robots.shapes.files.gltf import read_gltf
 from robots.shapes.files.step import read_step
@@ -14,11 +14,11 @@ from robots.shapes.files.text_repair import plain_text
 from robots.shapes.files.three_ds.read import read_3ds
 from robots.shapes.files.trimesh_formats import read_trimesh
 from robots.shapes.files.vrml.read import read_vrml
-from robots.shapes.mesh import Mesh
+from robots.shapes.geometry import Geometry
 
 Progress = Callable[[float], None]
 
-READERS: Mapping[str, Callable[..., Mesh]] = {
+READERS: Mapping[str, Callable[..., Geometry]] = {
     ".wrl": read_vrml,
     ".vrml": read_vrml,
     ".wrz": read_vrml,
@@ -46,29 +46,29 @@ _BEGINNINGS = (
 )
 
 
-def read_mesh(path: Path, progress: Progress | None = None, *, within: Path | None = None) -> Mesh:
-    """Return a mesh file's content, in the file's units and axes.
+def read_geometry(path: Path, progress: Progress | None = None, *, within: Path | None = None) -> Geometry:
+    """Return a shape file's content, in the file's units and axes.
 
     Args:
         progress: Called with the completed fraction, 0 to 1, by readers that know it.
         within: Other files are read below this folder only; files elsewhere count as missing.
 
     Raises:
-        MeshError: If the format is not supported, or the file is invalid.
+        ShapeError: If the format is not supported, or the file is invalid.
     """
     ending = path.suffix.lower()
     kind = _kind_of_content(path) or ending
     reader = READERS.get(kind)
     if reader is None:
-        raise MeshError(path, f"ending {path.suffix!r} is not supported; use {', '.join(READERS)}")
+        raise ShapeError(path, f"ending {path.suffix!r} is not supported; use {', '.join(READERS)}")
     options: dict[str, Any] = {"progress": progress, "within": within, "kind": kind.lstrip(".")}
     taken = inspect.signature(reader).parameters
-    mesh = reader(path, **{name: value for name, value in options.items() if name in taken})
+    geometry = reader(path, **{name: value for name, value in options.items() if name in taken})
     if READERS.get(ending) is reader and (kind == ending or reader not in (read_trimesh, read_gltf)):
-        return mesh
+        return geometry
     return replace(
-        mesh,
-        warnings=(f"ends in {ending!r} but contains {kind[1:].upper()}; read as that", *mesh.warnings),
+        geometry,
+        warnings=(f"ends in {ending!r} but contains {kind[1:].upper()}; read as that", *geometry.warnings),
     )
 
 
@@ -78,7 +78,7 @@ def _kind_of_content(path: Path) -> str:
         with path.open("rb") as file:
             head = file.read(1024)
     except OSError as error:
-        raise MeshError(path, f"cannot be read: {error.strerror}") from error
+        raise ShapeError(path, f"cannot be read: {error.strerror}") from error
     for beginning, ending in _BEGINNINGS:
         if head.startswith(beginning):
             return ending

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from robomesh.extras import is_missing, missing
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.declared_size import content
 from robots.shapes.files.gltf import read_gltf
-from robots.shapes.mesh import Mesh, transformed_mesh
+from robots.shapes.geometry import Geometry, transformed_geometry
 
 # Largest distance of a triangle from the surface [mm], and largest angle between neighbours [rad].
 _DEVIATION_MM = 0.1
@@ -47,7 +47,7 @@ def read_step(
     kind: str = "step",
     time_limit_s: float = TIME_LIMIT_S,
     memory_limit: int = MEMORY_LIMIT,
-) -> Mesh:
+) -> Geometry:
     """Return the triangles of a STEP or IGES file, in its axes, and in the unit of STEP or millimetres.
 
     Args:
@@ -55,11 +55,11 @@ def read_step(
         memory_limit: Largest address space of the reading process [bytes].
 
     Raises:
-        MeshError: If it is not a readable file of that kind, or exceeds the time or memory limit.
+        ShapeError: If it is not a readable file of that kind, or exceeds the time or memory limit.
     """
     form = "IGES" if kind in ("iges", "igs") else "STEP"
     if is_missing("cascadio"):
-        raise MeshError(path, missing("cascadio"))
+        raise ShapeError(path, missing("cascadio"))
     data = content(path)
     if form == "IGES":
         # Open CASCADE converts IGES to millimetres, and STEP to metres.
@@ -68,7 +68,7 @@ def read_step(
     elif b"ISO-10303-21" in data[:1024]:
         made_m, (unit_m, warnings) = 1.0, _unit(data)
     else:
-        raise MeshError(path, "is not a STEP file: one begins with ISO-10303-21")
+        raise ShapeError(path, "is not a STEP file: one begins with ISO-10303-21")
     with tempfile.TemporaryDirectory() as folder:
         glb = Path(folder) / "made.glb"
         arguments = (str(path), str(glb), str(memory_limit), form.lower())
@@ -80,25 +80,25 @@ def read_step(
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
-            raise MeshError(
+            raise ShapeError(
                 path, f"took Open CASCADE more than {time_limit_s:.0f} s; it may be damaged"
             ) from error
         if done.returncode in _ENDED_BY_MEMORY or _NO_MEMORY.search(done.stderr):
-            raise MeshError(path, f"needs more than {memory_limit / 1024**3:g} GB of memory to read")
+            raise ShapeError(path, f"needs more than {memory_limit / 1024**3:g} GB of memory to read")
         if done.returncode == -signal.SIGSEGV:
             # Open CASCADE does not check whether an allocation failed.
-            raise MeshError(
+            raise ShapeError(
                 path,
                 f"crashed Open CASCADE: it needs more than {memory_limit / 1024**3:g} GB of memory to read, "
                 "or is damaged",
             )
         if done.returncode or not glb.is_file():
-            raise MeshError(path, f"cannot be read as {form}: {_reason(done.stdout + done.stderr, form)}")
-        mesh = read_gltf(glb)
-    if not mesh.triangle_count:
-        raise MeshError(path, "has no solid or surface that can be drawn")
-    mesh = transformed_mesh(mesh, np.diag([made_m / unit_m] * 3 + [1.0]))
-    return replace(mesh, warnings=(*mesh.warnings, *warnings), unit_m=unit_m, up="z")
+            raise ShapeError(path, f"cannot be read as {form}: {_reason(done.stdout + done.stderr, form)}")
+        geometry = read_gltf(glb)
+    if not geometry.triangle_count:
+        raise ShapeError(path, "has no solid or surface that can be drawn")
+    geometry = transformed_geometry(geometry, np.diag([made_m / unit_m] * 3 + [1.0]))
+    return replace(geometry, warnings=(*geometry.warnings, *warnings), unit_m=unit_m, up="z")
 
 
 def _unit(data: bytes) -> tuple[float, tuple[str, ...]]:

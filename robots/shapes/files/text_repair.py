@@ -5,7 +5,7 @@ import xml.etree.ElementTree as Xml
 from collections.abc import Iterator
 from pathlib import Path
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.xml_text import unicode_of
 
 # Geometry instances, counted once for each instance, and the numbers in their face lists.
@@ -27,7 +27,7 @@ def counted_from_first(path: Path, text: str) -> str:
     """Replace negative vertex numbers in an OBJ file's faces (-1: the last vertex so far).
 
     Raises:
-        MeshError: If one goes back beyond the first vertex.
+        ShapeError: If one goes back beyond the first vertex.
     """
     if not _NEGATIVE_FACE.search(text):
         return text
@@ -51,7 +51,7 @@ def _corner(path: Path, line: int, word: str, counts: dict[str, int]) -> str:
         if text.startswith("-") and text[1:].isdecimal():
             forward = count + 1 + int(text[:20])
             if forward < 1:
-                raise MeshError(
+                raise ShapeError(
                     path, f"a face uses vertex {text[:20]}; there are {count}", place=f"line {line}"
                 )
             text = str(forward)
@@ -63,12 +63,12 @@ def check_instances(path: Path, data: bytes) -> None:
     """Reject a COLLADA file with nested instances that add up to more than can be drawn.
 
     Raises:
-        MeshError: If it draws too much, a node contains itself, or it is not XML.
+        ShapeError: If it draws too much, a node contains itself, or it is not XML.
     """
     try:
         root = Xml.fromstring(data)
     except (Xml.ParseError, ValueError, LookupError) as error:
-        raise MeshError(path, f"cannot be read as DAE: {error}") from None
+        raise ShapeError(path, f"cannot be read as DAE: {error}") from None
     sizes: dict[str, int] = {}
     nodes: dict[str, Xml.Element] = {}
     for element in root.iter():
@@ -84,7 +84,7 @@ def check_instances(path: Path, data: bytes) -> None:
         if _name(element) == "visual_scene":
             instances, numbers = drawn.of(element, 0)
             if instances > _MOST_INSTANCES or numbers > _MOST_NUMBERS:
-                raise MeshError(
+                raise ShapeError(
                     path,
                     f"draws {instances} instances with {numbers} numbers; at most {_MOST_INSTANCES} and "
                     f"{_MOST_NUMBERS} are read",
@@ -105,7 +105,7 @@ class _Drawn:
 
     def of(self, element: Xml.Element, depth: int) -> tuple[int, int]:
         if depth > _MOST_NESTED:
-            raise MeshError(
+            raise ShapeError(
                 self.path, f"nodes are nested deeper than {_MOST_NESTED}, or a node contains itself"
             )
         instances = numbers = 0

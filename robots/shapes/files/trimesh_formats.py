@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.declared_size import Declared, read_declared
-from robots.shapes.mesh import (
+from robots.shapes.geometry import (
     Color,
     FloatArray,
+    Geometry,
     IndexArray,
     Material,
-    Mesh,
     Part,
     Wire,
     placed,
@@ -34,7 +34,7 @@ from robots.shapes.normals import creased
 _CREASE = np.radians(30)
 
 
-def read_trimesh(path: Path, *, kind: str = "") -> Mesh:
+def read_trimesh(path: Path, *, kind: str = "") -> Geometry:
     """Return the content of an STL, OBJ, PLY or DAE file, in the file's units and axes.
 
     Other files that it names are read below its folder only; files elsewhere count as missing.
@@ -43,35 +43,35 @@ def read_trimesh(path: Path, *, kind: str = "") -> Mesh:
         kind: The format as a file ending ("stl"); the file's ending by default.
 
     Raises:
-        MeshError: If the file is not of that format, or has a vertex that is not finite.
+        ShapeError: If the file is not of that format, or has a vertex that is not finite.
     """
     kind = kind or path.suffix.lower().lstrip(".")
     declared = read_declared(path, kind)
-    mesh = mesh_of(path, _drawn(path, kind, declared), declared)
-    if not mesh.parts and not mesh.wires and kind == "stl":
-        raise MeshError(path, "is not an STL file: it has no facet")
-    return mesh
+    geometry = geometry_of(path, _drawn(path, kind, declared), declared)
+    if not geometry.parts and not geometry.wires and kind == "stl":
+        raise ShapeError(path, "is not an STL file: it has no facet")
+    return geometry
 
 
-def mesh_of(path: Path, found: Sequence[Part | Wire], declared: Declared) -> Mesh:
-    """Return the mesh of a file's shapes, without those that draw nothing.
+def geometry_of(path: Path, found: Sequence[Part | Wire], declared: Declared) -> Geometry:
+    """Return the geometry of a file's parts and wires, without those that draw nothing.
 
     Raises:
-        MeshError: If a vertex is not finite.
+        ShapeError: If a vertex is not finite.
     """
     parts = tuple(part for part in found if isinstance(part, Part) and len(part.triangles))
     wires = tuple(wire for wire in found if isinstance(wire, Wire) and len(wire.vertices))
     shapes: list[Part | Wire] = [*parts, *wires]
     for shape in shapes:
         if not np.isfinite(shape.vertices).all():
-            raise MeshError(path, f"{shape.name!r} has a vertex with a non-finite coordinate")
+            raise ShapeError(path, f"{shape.name!r} has a vertex with a non-finite coordinate")
     warnings = declared.warnings
     textures = sorted({part.material.texture for part in parts} - {""})
     if textures:
         warnings = (*warnings, f"textures are kept by name, not drawn: {', '.join(textures[:10])}")
     if not parts and not wires:
         warnings = (*warnings, "has no shape that can be drawn")
-    return Mesh(
+    return Geometry(
         parts,
         wires,
         warnings=warnings,
@@ -86,7 +86,7 @@ def _drawn(path: Path, kind: str, declared: Declared) -> list[Part | Wire]:
     """Return the shapes that trimesh reads from a file.
 
     Raises:
-        MeshError: For any exception of trimesh.
+        ShapeError: For any exception of trimesh.
     """
     trimesh: Any = importlib.import_module("trimesh")
     # trimesh logs tracebacks; the cause is raised here instead.
@@ -103,13 +103,13 @@ def _drawn(path: Path, kind: str, declared: Declared) -> list[Part | Wire]:
                 skip_materials=bool(declared.missing),
             )
             return list(_parts(scene, declared))
-    except MeshError:
+    except ShapeError:
         raise
     except MemoryError as error:
-        raise MeshError(path, "needs more memory than is available") from error
+        raise ShapeError(path, "needs more memory than is available") from error
     # trimesh's readers raise arbitrary exceptions for damaged files.
     except Exception as error:
-        raise MeshError(path, f"cannot be read as {kind.upper()}: {_reason(error)}") from error
+        raise ShapeError(path, f"cannot be read as {kind.upper()}: {_reason(error)}") from error
 
 
 def _reason(error: Exception) -> str:

@@ -1,10 +1,10 @@
-"""Unit and upward axis of an imported mesh file, as stated by the file or guessed from its size."""
+"""Unit and upward axis of an imported shape file, as stated by the file or guessed from its size."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from robots.shapes.mesh import Y_UP_TO_Z_UP, FloatArray, Mesh, bounds
+from robots.shapes.geometry import Y_UP_TO_Z_UP, FloatArray, Geometry, bounds
 
 # A robot's link, from a small wrist to a long boom [m].
 LEAST_M, MOST_M = 0.005, 5.0
@@ -28,22 +28,23 @@ class Guess:
     sentence: str
 
 
-def guess(mesh: Mesh) -> Guess:
+def guess(geometry: Geometry) -> Guess:
     """Return the file's unit and upward axis.
 
-    A missing unit is guessed: the one in which the mesh is as large as a robot's link. A missing axis (VRML,
+    A missing unit is guessed: the one in which the shape is as large as a robot's link. A missing axis (VRML,
     3DS, STL, OBJ, PLY) is z, as is usual for robots.
     """
-    low, high = bounds(mesh)
+    low, high = bounds(geometry)
     size = float((high - low).max())
-    up = mesh.up or "z"
-    axis = f"{up} up" + ("" if mesh.up else " assumed")
-    if mesh.unit_m is not None:
-        odd = "" if size == 0 or LEAST_M <= size * mesh.unit_m <= MOST_M else "; odd for a robot's link"
+    up = geometry.up or "z"
+    axis = f"{up} up" + ("" if geometry.up else " assumed")
+    if geometry.unit_m is not None:
+        odd = "" if size == 0 or LEAST_M <= size * geometry.unit_m <= MOST_M else "; odd for a robot's link"
         return Guess(
-            mesh.unit_m,
+            geometry.unit_m,
             up,
-            f"in {_name(mesh.unit_m)}, as the file states: {_length(size * mesh.unit_m)} large{odd}; {axis}",
+            f"in {_name(geometry.unit_m)}, as the file states: "
+            f"{_length(size * geometry.unit_m)} large{odd}; {axis}",
         )
     if size == 0:
         return Guess(0.001, up, f"no triangles to judge the size by: millimetres assumed; {axis}")

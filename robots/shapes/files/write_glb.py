@@ -1,6 +1,6 @@
 """GLB writer: triangles, lines and points, with the colours of materials and vertices.
 
-glTF defines y as up, and a robot's axes are z up: the root node turns them. The same mesh gives the same
+glTF defines y as up, and a robot's axes are z up: the root node turns them. The same shape gives the same
 bytes. Source: glTF 2.0, Khronos Group, 3.4.
 """
 
@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.shapes.files.gltf import BINARY_CHUNK, JSON_CHUNK, LINES, POINTS, TRIANGLES, TURNED_MARK
-from robots.shapes.mesh import Y_UP_TO_Z_UP, Color, FloatArray, Material, Mesh, Part, Wire
+from robots.shapes.geometry import Y_UP_TO_Z_UP, Color, FloatArray, Geometry, Material, Part, Wire
 
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
-# Metallic and roughness factors of some materials; the older mesh formats cannot state them.
+# Metallic and roughness factors of some materials; the older shape formats cannot state them.
 _FINISHES = {"paint": (0.0, 0.45), "casting": (0.25, 0.6), "steel": (0.85, 0.3), "rubber": (0.0, 0.9)}
 
 
@@ -48,22 +48,22 @@ class _Document:
         return len(self.accessors) - 1
 
 
-def glb_of(mesh: Mesh) -> bytes:
-    """Return a mesh as binary glTF, in the mesh's unit: one glTF mesh per material, then lines and points."""
+def glb_of(geometry: Geometry) -> bytes:
+    """Return binary glTF in the geometry's unit: one glTF mesh per material, then lines and points."""
     document = _Document()
-    for part in merged(mesh.parts):
+    for part in merged(geometry.parts):
         if len(part.triangles):
             _add(document, part, part.triangles, TRIANGLES, part.two_sided)
-    for wire in mesh.wires:
+    for wire in geometry.wires:
         if len(wire.vertices):
             _add(document, wire, wire.segments, LINES if len(wire.segments) else POINTS, False)
-    return _packed(document, _main_color(mesh))
+    return _packed(document, _main_color(geometry))
 
 
-def _main_color(mesh: Mesh) -> Color | None:
-    """Return the colour that covers most of a mesh; None: it has no triangles."""
+def _main_color(geometry: Geometry) -> Color | None:
+    """Return the colour that covers most of a shape; None: it has no triangles."""
     areas: dict[Color, float] = {}
-    for part in mesh.parts:
+    for part in geometry.parts:
         corners = part.vertices[part.triangles]
         doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         color = part.material.diffuse

@@ -1,21 +1,21 @@
-"""Writers of STL, OBJ and PLY files, in the mesh's units and axes."""
+"""Writers of STL, OBJ and PLY files, in the shape's units and axes."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from robots.shapes.mesh import FloatArray, Material, Mesh, Part
-from robots.shapes.mesh import unit as unit_vectors
+from robots.shapes.geometry import FloatArray, Geometry, Material, Part
+from robots.shapes.geometry import unit as unit_vectors
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
 _VERTEX = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("color", "u1", 4)])
 _FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 
 
-def write_stl(mesh: Mesh) -> bytes:
+def write_stl(geometry: Geometry) -> bytes:
     """Return a binary .stl file, which has the shape only."""
     corners = np.concatenate(
-        [np.zeros((0, 3, 3)), *(part.vertices[part.triangles] for part in mesh.parts)], dtype=np.float64
+        [np.zeros((0, 3, 3)), *(part.vertices[part.triangles] for part in geometry.parts)], dtype=np.float64
     )
     facets = np.zeros(len(corners), dtype=_FACET)
     facets["corners"] = corners
@@ -24,10 +24,10 @@ def write_stl(mesh: Mesh) -> bytes:
     return b"robomesh".ljust(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()
 
 
-def write_ply(mesh: Mesh) -> bytes:
+def write_ply(geometry: Geometry) -> bytes:
     """Return a binary .ply file with the shape and the colours, materials' colours given to vertices."""
     vertices, faces, count = [], [], 0
-    for part in mesh.parts:
+    for part in geometry.parts:
         rows = np.zeros(len(part.vertices), dtype=_VERTEX)
         rows["position"], rows["normal"] = part.vertices, part.normals
         rows["color"] = np.round(_colors(part) * 255)
@@ -43,7 +43,7 @@ def write_ply(mesh: Mesh) -> bytes:
             f"element vertex {count}",
             *(f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")),
             *(f"property uchar {name}" for name in ("red", "green", "blue", "alpha")),
-            f"element face {mesh.triangle_count}",
+            f"element face {geometry.triangle_count}",
             "property list uchar int vertex_indices",
             "end_header\n",
         ]
@@ -57,17 +57,17 @@ def _colors(part: Part) -> FloatArray:
     return np.tile([*part.material.diffuse, 1 - part.material.transparency], (len(part.vertices), 1))
 
 
-def write_obj(mesh: Mesh, library: str) -> tuple[str, str]:
+def write_obj(geometry: Geometry, library: str) -> tuple[str, str]:
     """Return the text of an .obj file, and the text of its materials for the .mtl file named `library`."""
     names: dict[Material, str] = {}
-    for part in mesh.parts:
+    for part in geometry.parts:
         base = "_".join(part.material.name.split()) or "material"
         taken = set(names.values())
         name = next(n for n in _numbered(base) if n not in taken) if part.material not in names else ""
         names.setdefault(part.material, name)
     lines = [f"mtllib {library}"]
     count = 1
-    for number, part in enumerate(mesh.parts):
+    for number, part in enumerate(geometry.parts):
         lines.append(f"o {'_'.join(part.name.split()) or f'part{number}'}")
         lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in part.vertices.tolist()]
         lines += [f"vn {x:.6g} {y:.6g} {z:.6g}" for x, y, z in part.normals.tolist()]

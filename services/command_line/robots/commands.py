@@ -27,7 +27,7 @@ class ExportFolderError(ServiceError):
 def check(robot: _Robot, as_json: Json = False) -> None:
     """Check a description and its meshes: a line a problem; exit status 1 when there is one."""
     from robots.descriptions.description import load
-    from robots.descriptions.mesh_inspection import mesh_findings
+    from robots.descriptions.shape_inspection import inspect_shapes
     from robots.schema.errors import DescriptionError
 
     name = robot
@@ -37,13 +37,13 @@ def check(robot: _Robot, as_json: Json = False) -> None:
     try:
         description = load(robot)
         name = description.name
-        found, odd = mesh_findings(description)
+        found, odd = inspect_shapes(description)
         problems += [{"file": each.file, "path": [], "text": each.text} for each in found]
         warnings = [{"file": each.file, "text": each.text} for each in odd]
         if not problems:
-            from robots.bodies.report import collision_report
+            from robots.bodies.collision_coverage import collision_coverage
 
-            report = collision_report(robot)
+            report = collision_coverage(robot)
     except DescriptionError as error:
         if not Path(error.source).is_file():
             raise  # nothing was checked
@@ -157,7 +157,7 @@ def _cell(value: float) -> str:
 def export(robot: _Robot, folder: Annotated[Path, typer.Argument(metavar="FOLDER")]) -> None:
     """Write a robot as URDF with GLB meshes."""
     from robots.descriptions.description import load
-    from robots.descriptions.glb import collision_meshes, link_meshes, main_colors
+    from robots.descriptions.glb import collision_glbs, link_glbs, main_colors
     from robots.descriptions.urdf.write import collision_beside, glb_beside, to_urdf
 
     description = load(robot)
@@ -168,14 +168,14 @@ def export(robot: _Robot, folder: Annotated[Path, typer.Argument(metavar="FOLDER
         raise ExportFolderError(
             f"{folder}: holds another robot ({there}), whose meshes would be overwritten: choose a new folder"
         )
-    meshes = link_meshes(description)
-    files = {glb_beside(link): glb for link, glb in meshes.items()}
-    files |= {collision_beside(link): glb for link, glb in collision_meshes(description).items()}
+    shapes = link_glbs(description)
+    files = {glb_beside(link): glb for link, glb in shapes.items()}
+    files |= {collision_beside(link): glb for link, glb in collision_glbs(description).items()}
     try:
         (folder / "meshes").mkdir(parents=True, exist_ok=True)
         for path, glb in files.items():
             (folder / path).write_bytes(glb)
-        text = to_urdf(description, collision_uri=collision_beside, colors=main_colors(meshes))
+        text = to_urdf(description, collision_uri=collision_beside, colors=main_colors(shapes))
         urdf.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ExportFolderError(f"{folder}: cannot be written: {error.strerror}") from None

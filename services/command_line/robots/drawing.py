@@ -27,22 +27,22 @@ def draw_four_views(description: RobotDescription, out: Path) -> None:
     from renderer.drawing.drawing import Drawing
     from renderer.drawing.opengl import open_context
     from renderer.pictures.overlay import Overlay, write_over
-    from renderer.scene.appearance import appearance_of, home_placements, mesh_name
+    from renderer.scene.appearance import appearance_of, home_placements, shape_name
     from renderer.scene.assembly import Placed, scene_of
     from renderer.scene.cameras import fitted
     from renderer.scene.views import camera_of
     from renderer.shapes.cache import cache_folder, prepared_once
-    from robots.descriptions.glb import link_meshes
+    from robots.descriptions.glb import link_glbs
     from robots.descriptions.urdf.write import to_urdf
     from services.kinematics.descriptions import describe
 
     drawing = Drawing(open_context(), _SIZE)
     try:
-        meshes = link_meshes(description)
+        shapes = link_glbs(description)
         message = describe(
             description,
             urdf=to_urdf(description),
-            meshes=meshes,
+            shapes=shapes,
             base_to_site=np.eye(4),
             cell="",
             simulated=False,
@@ -50,9 +50,9 @@ def draw_four_views(description: RobotDescription, out: Path) -> None:
         aspect = _SIZE[0] / _SIZE[1]
         appearance = appearance_of(message)
         for link in message.links:
-            if link.mesh and not drawing.has(mesh_name(link)):
-                glb = prepared_once(meshes[link.name], color=link.color, folder=cache_folder())
-                drawing.add(mesh_name(link), glb)
+            if link.mesh and not drawing.has(shape_name(link)):
+                glb = prepared_once(shapes[link.name], color=link.color, folder=cache_folder())
+                drawing.add(shape_name(link), glb)
         scene = scene_of(Placed(appearance, home_placements(appearance)))
         pictures = []
         corners = drawing.corners(scene)

@@ -124,7 +124,7 @@ def ros2(
         domain=domain, robots=tuple(robot or ()), site=_site(), metrics=_metrics(metrics), node=node
     )
     if meshes is not None:
-        settings = replace(settings, meshes=meshes)
+        settings = replace(settings, shapes=meshes)
     service.run(
         bridge.serve,
         settings,

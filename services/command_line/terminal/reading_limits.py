@@ -9,7 +9,7 @@ from services.command_line.terminal.output import print_line
 
 LONGEST_S = 180.0
 # These commands spend their time on the file that they read; others may run for days.
-_LIMITED = ("mesh", "robot")
+_LIMITED = ("mesh", "robot", "shapes")
 _WAIT_FOR_A_PERSON = (("robot", "verify"),)
 _LIMITED_IN_MEMORY = (*_LIMITED, "program", "fk", "ik")
 

@@ -22,19 +22,19 @@ from robots.descriptions.description import (
 )
 from robots.descriptions.description_text import as_saved
 from robots.descriptions.importing import import_as_dh
-from robots.descriptions.mesh_inspection import mesh_findings
 from robots.descriptions.save_description import read_robot, refused_path
-from robots.descriptions.summary import mesh_summary
+from robots.descriptions.shape_inspection import inspect_shapes
+from robots.descriptions.summary import geometry_summary
 from robots.kinematics.joints import joints_of
 from robots.kinematics.model import RobotModel, build_model, link_placements, tool_placement
 from robots.schema.description_checks import named_files
-from robots.schema.errors import DescriptionError, MeshError
+from robots.schema.errors import DescriptionError, ShapeError
 from robots.schema.robot_toml import UrdfDescription
 from robots.schema.units import position_factor
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 from robots.shapes.files.unit_guess import guess
 from robots.shapes.files.write_glb import glb_of
-from robots.shapes.mesh import Mesh
+from robots.shapes.geometry import Geometry
 from robots.shapes.surface_points import surface_points
 from services.console.common.errors import RefusedRequest
 from services.console.define.store import MOST_FILES, Store, put
@@ -51,15 +51,15 @@ def mesh(store: Store, folder: Path, request: Json) -> Json:
     If all of the mesh is in missing files, the result is empty and names them.
     """
     try:
-        found = read_mesh(folder / request["file"], within=folder)
-    except MeshError as error:
+        found = read_geometry(folder / request["file"], within=folder)
+    except ShapeError as error:
         if not error.missing:
             raise
-        found = Mesh(warnings=(error.reason,), missing=(error.missing,))
+        found = Geometry(warnings=(error.reason,), missing=(error.missing,))
     guessed = guess(found)
     return {
         "glb": put(store, glb_of(found)),
-        **mesh_summary(found),
+        **geometry_summary(found),
         "points": [[float(f"{value:.5g}") for value in point] for point in surface_points(found, _POINTS)],
         "missing": list(found.missing),
         "scale": guessed.scale_m,
@@ -74,7 +74,7 @@ def check(_: Store, folder: Path, request: Json) -> Json:
     description, problems = from_values(values, folder=folder, confined=True)
     if description is None:
         # A missing mesh does not prevent computing the placements.
-        description, _ignored = from_values(_without_meshes(values), folder=folder, confined=True)
+        description, _ignored = from_values(_without_shapes(values), folder=folder, confined=True)
     answer: Json = {"problems": [_problem(each) for each in problems], "tool": None, "links": {}}
     if description is not None:
         model = build_model(description)
@@ -89,12 +89,12 @@ def meshes(_: Store, folder: Path, request: Json) -> Json:
     """Return every mesh of a valid description that cannot be drawn, as a problem with its place."""
     values = request["description"]
     places = {folder / name: place for place, name in named_files(values)}
-    found, _odd = mesh_findings(_description(folder, values))
+    found, _odd = inspect_shapes(_description(folder, values))
     problems = []
-    for finding in found:
-        file = Path(finding.file)
+    for note in found:
+        file = Path(note.file)
         name = file.relative_to(folder) if file.is_relative_to(folder) else file.name
-        problems.append(_problem(Problem(places.get(file, ()), f"{name}: {finding.text}")))
+        problems.append(_problem(Problem(places.get(file, ()), f"{name}: {note.text}")))
     return {"problems": problems}
 
 
@@ -186,7 +186,7 @@ def _description(folder: Path, values: Json) -> RobotDescription:
     return description
 
 
-def _without_meshes(values: Mapping[str, Any]) -> Json:
+def _without_shapes(values: Mapping[str, Any]) -> Json:
     without = dict(values)
     if isinstance(values.get("base"), dict):
         without["base"] = {key: each for key, each in values["base"].items() if not key.endswith("mesh")}

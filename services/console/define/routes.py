@@ -52,7 +52,7 @@ class Define:
         self.settings = settings
         self.store = store.open_store(settings.store)
         self.workshop = Workshop(self.store.folder, settings.limits)
-        self._meshes: OrderedDict[tuple[str, str], Json] = OrderedDict()
+        self._shapes: OrderedDict[tuple[str, str], Json] = OrderedDict()
         self._joint_counts: OrderedDict[str, int] = OrderedDict()
         self._writing = asyncio.Lock()
         self._uploads = 0
@@ -176,10 +176,10 @@ class Define:
         asked = await self._json(request, file=str)
         folder = await self._laid_out(asked)
         file = self._file_of(asked)
-        known = self._meshes.get((folder.name, file))
+        known = self._shapes.get((folder.name, file))
         if known is None or store.stored(self.store, known["glb"]) is None:
             known = await self.workshop.slow.run("mesh", folder, {"file": file}, **_job_options(request))
-            _remember(self._meshes, (folder.name, file), known)
+            _remember(self._shapes, (folder.name, file), known)
         return JSONResponse(known)
 
     async def check(self, request: Request) -> Response:

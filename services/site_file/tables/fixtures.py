@@ -16,10 +16,10 @@ from robomesh.contract import keys
 from robomesh.errors import KeyNameError
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import Shape, rgb
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.poses import pose_matrix
 from robots.schema.robot_toml import Pose, Positive, Units, nearest
-from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.geometry import Geometry, Material, Part
 from robots.shapes.normals import creased
 from robots.shapes.solids import ball, box, turned
 
@@ -152,7 +152,7 @@ def fixture_shape(fixture: Fixture) -> Shape:
         assert fixture.sphere is not None
         solid = ball(fixture.sphere * _MILLIMETRE * rounder**2, _ROUND)
     vertices, normals, triangles = creased(*solid, math.pi / 6)
-    return Shape(Mesh(parts=(Part("", Material(), vertices, normals, triangles),)), np.eye(4), color)
+    return Shape(Geometry(parts=(Part("", Material(), vertices, normals, triangles),)), np.eye(4), color)
 
 
 def fixture_to_site(fixture: Fixture) -> FloatArray:
@@ -209,7 +209,7 @@ def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bo
             try:
                 shapes_glb((shape,))
                 missing = _missing_part(fixture.mesh, shape.within)
-            except MeshError as error:
+            except ShapeError as error:
                 return f"fixture {fixture.name}: mesh = {str(fixture.mesh)!r}: {error}"
             if missing:
                 return (
@@ -224,9 +224,9 @@ def _missing_part(mesh: Path, within: Path | None) -> str:
 
     Only the VRML reader goes on without such a file; the others refuse the mesh.
     """
-    from robots.shapes.files.read import READERS, read_mesh
+    from robots.shapes.files.read import READERS, read_geometry
 
     if READERS.get(mesh.suffix.lower()) is not READERS[".wrl"]:
         return ""
-    missing = read_mesh(mesh, within=within).missing
+    missing = read_geometry(mesh, within=within).missing
     return next((each for each in missing if Path(each).suffix.lower() in READERS), "")

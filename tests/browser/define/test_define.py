@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import expect
 
 from robots.descriptions.description import load
-from robots.descriptions.glb import link_meshes
+from robots.descriptions.glb import link_glbs
 from robots.descriptions.urdf.write import to_urdf
 from tests.browser.define.page import (
     SHAPES,
@@ -365,7 +365,7 @@ def test_a_file_that_cannot_be_read_is_refused_by_name_and_the_others_are_taken(
 
 def test_a_urdf_and_its_shapes_become_rows(open_page, tmp_path):
     description = load("pt500")
-    shapes = link_meshes(description, cache=tmp_path)
+    shapes = link_glbs(description, cache=tmp_path)
     page = open_page("#/define")
     drop(page, ("pt500.urdf", to_urdf(description).encode()))
     expect(missing_files(page)).to_contain_text("meshes/column.glb")

@@ -1,1 +1,1 @@
-"""Reader and writer of 3DS, the files of 3D Studio: meshes, materials and hierarchy."""
+"""Reader and writer of 3DS, the files of 3D Studio: shapes, materials and hierarchy."""

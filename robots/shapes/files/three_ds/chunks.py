@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 
 _HEADER = struct.Struct("<HI")
 
@@ -41,7 +41,7 @@ class Source:
                 wrong lengths for the outermost chunks, although the content is complete.
 
         Raises:
-            MeshError: If a chunk is longer than its container; the error has the byte.
+            ShapeError: If a chunk is longer than its container; the error has the byte.
         """
         while end - start >= _HEADER.size:
             identity, length = _HEADER.unpack_from(self.data, start)
@@ -86,7 +86,7 @@ class Source:
         """Return (count,) finite numbers.
 
         Raises:
-            MeshError: If they are truncated or not finite.
+            ShapeError: If they are truncated or not finite.
         """
         if end - start < 4 * count:
             raise self.error(start, f"{count} numbers are needed; {max(end - start, 0)} bytes follow")
@@ -95,9 +95,9 @@ class Source:
             raise self.error(start, f"{found.tolist()} must be finite")
         return found
 
-    def error(self, position: int, reason: str) -> MeshError:
+    def error(self, position: int, reason: str) -> ShapeError:
         """Return an error at a byte."""
-        return MeshError(self.path, reason, place=f"byte {position}")
+        return ShapeError(self.path, reason, place=f"byte {position}")
 
     def warn(self, warning: str) -> None:
         """Record a warning once; at most a hundred, because a damaged file can cause any number."""

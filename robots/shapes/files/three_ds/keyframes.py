@@ -5,7 +5,7 @@
     track = flags:uint16 unused:8 count:uint32 then keys
     key   = frame:uint32 flags:uint16 [a float for each of the flags' low 5 bits] values
 
-In the real files examined, the first key of each track repeats the mesh's local frame (4160), so vertices
+In the real files examined, the first key of each track repeats the shape's local frame (4160), so vertices
 need not be moved by it. (One file was saved in mid-motion and has another rotation.) Rotations are clockwise
 about their axis: only then do the keys of those files agree with their local frames.
 """
@@ -18,7 +18,7 @@ import numpy as np
 
 from robots.schema.poses import axis_rotation
 from robots.shapes.files.three_ds.chunks import Chunk, Source
-from robots.shapes.mesh import FloatArray, Node
+from robots.shapes.geometry import FloatArray, Node
 
 _OBJECT = 0xB002
 _NONE = 0xFFFF

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from robots.shapes.files.three_ds.chunks import Chunk, Source
-from robots.shapes.mesh import Color, Material
+from robots.shapes.geometry import Color, Material
 
 _FLOATS, _BYTES = (0x0010, 0x0013), (0x0011, 0x0012)
 _LINEAR = (0x0012, 0x0013)

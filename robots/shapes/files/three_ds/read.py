@@ -10,7 +10,7 @@
     └── B000 key frames
 
 Vertices are already in place. The local frame and the key frames say how an object was built and how it
-moves; some readers apply them to a static mesh, which puts it in the wrong place.
+moves; some readers apply them to a static shape, which puts it in the wrong place.
 """
 
 from collections.abc import Iterator
@@ -19,11 +19,11 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.three_ds.chunks import Chunk, Source
 from robots.shapes.files.three_ds.keyframes import nodes_of
 from robots.shapes.files.three_ds.materials import Surface, surface_of
-from robots.shapes.mesh import FloatArray, IndexArray, Material, Mesh, Node, Part
+from robots.shapes.geometry import FloatArray, Geometry, IndexArray, Material, Node, Part
 from robots.shapes.normals import grouped
 
 _MAIN, _EDITOR, _OBJECT, _MESH, _MATERIAL, _KEYFRAMES = 0x4D4D, 0x3D3D, 0x4000, 0x4100, 0xAFFF, 0xB000
@@ -40,20 +40,20 @@ class _Object:
     mirrored: bool = False
 
 
-def read_3ds(path: Path) -> Mesh:
+def read_3ds(path: Path) -> Geometry:
     """Return the triangles and the hierarchy of a .3ds file, in the file's units and axes.
 
     Each node's origin is its object's pivot; parts have their object's name.
 
     Raises:
-        MeshError: If it is not a 3DS file, or is damaged; the error has the byte.
+        ShapeError: If it is not a 3DS file, or is damaged; the error has the byte.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise MeshError(path, f"cannot be read: {error.strerror}") from error
+        raise ShapeError(path, f"cannot be read: {error.strerror}") from error
     if len(data) < 6 or data[:2] != b"MM":
-        raise MeshError(path, "is not a 3DS file: it does not begin with chunk 4D4D")
+        raise ShapeError(path, "is not a 3DS file: it does not begin with chunk 4D4D")
     source = Source(path, data)
     surfaces: dict[str, Surface] = {}
     objects: list[_Object] = []
@@ -71,17 +71,17 @@ def read_3ds(path: Path) -> Mesh:
         elif section.id == _KEYFRAMES:
             try:
                 nodes = nodes_of(source, section)
-            except MeshError as error:  # the triangles do not depend on the hierarchy
+            except ShapeError as error:  # the triangles do not depend on the hierarchy
                 source.warn(f"{error.place}: {error.reason}; the hierarchy is left out")
     parts = tuple(part for found in objects for part in _parts(source, found, surfaces))
     if not parts:
         if source.warnings:
-            raise MeshError(path, source.warnings[0])
+            raise ShapeError(path, source.warnings[0])
         source.warn("has no triangles")
     textures = sorted({part.material.texture for part in parts} - {""})
     if textures:
         source.warn(f"textures are kept by name, not drawn: {', '.join(textures[:10])}")
-    return Mesh(parts, warnings=tuple(source.warnings), nodes=nodes)
+    return Geometry(parts, warnings=tuple(source.warnings), nodes=nodes)
 
 
 def _objects(source: Source, chunk: Chunk) -> Iterator[_Object]:

@@ -4,22 +4,22 @@ import struct
 
 import numpy as np
 
-from robots.shapes.mesh import Color, Material, Mesh, Part
+from robots.shapes.geometry import Color, Geometry, Material, Part
 
 # 3DS counts vertices and faces in 16 bits.
 _MOST = 65535
 
 
-def write_3ds(mesh: Mesh) -> bytes:
-    """Return the content of a .3ds file; the same mesh gives the same bytes.
+def write_3ds(geometry: Geometry) -> bytes:
+    """Return the content of a .3ds file; the same shape gives the same bytes.
 
     Raises:
         ValueError: If a part has more than 65,535 vertices or triangles.
     """
-    materials = {part.material.name or "default": part for part in mesh.parts}
+    materials = {part.material.name or "default": part for part in geometry.parts}
     version = _chunk(0x3D3E, struct.pack("<I", 3))
     blocks = [_material(name, part.material, part.two_sided) for name, part in materials.items()]
-    objects = [_object(f"part{number}", part) for number, part in enumerate(mesh.parts)]
+    objects = [_object(f"part{number}", part) for number, part in enumerate(geometry.parts)]
     editor = _chunk(0x3D3D, version, *blocks, *objects)
     return _chunk(0x4D4D, _chunk(0x0002, struct.pack("<I", 3)), editor)
 

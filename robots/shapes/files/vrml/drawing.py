@@ -16,7 +16,7 @@ from robots.shapes.files.vrml.parser import MAX_DEPTH, Node
 from robots.shapes.files.vrml.protos import node_of, resolved
 from robots.shapes.files.vrml.transform import transform_matrix
 from robots.shapes.files.vrml.values import color, nodes_of, number, strings
-from robots.shapes.mesh import Color, FloatArray, Material, Part, Wire, placed, transformed
+from robots.shapes.geometry import Color, FloatArray, Material, Part, Wire, placed, transformed
 
 # A few nested USEs can expand to billions of nodes.
 MAX_NODES = 200_000
@@ -78,11 +78,11 @@ class Drawing:
         """Draw a node and its children.
 
         Args:
-            placement: (4, 4) from the node's coordinates to the mesh's.
+            placement: (4, 4) from the node's coordinates to the shape's.
             inside: The files that are being drawn, from the outermost to the node's.
 
         Raises:
-            MeshError: If a field has an invalid value, or too much is drawn.
+            ShapeError: If a field has an invalid value, or too much is drawn.
         """
         self._drawn += 1
         if self._drawn > MAX_NODES:

@@ -9,7 +9,7 @@ from robots.shapes.faces import Faces
 from robots.shapes.files.vrml.parser import Node
 from robots.shapes.files.vrml.transform import rotations
 from robots.shapes.files.vrml.values import flag, number, rows
-from robots.shapes.mesh import FloatArray, unit
+from robots.shapes.geometry import FloatArray, unit
 from robots.shapes.polygons import cross
 
 _MOST_POINTS = 5_000_000
@@ -21,7 +21,7 @@ def extrusion(node: Node) -> Faces:
     """Return the sides, as quadrilaterals, and the caps of an Extrusion.
 
     Raises:
-        MeshError: If it has millions of points.
+        ShapeError: If it has millions of points.
     """
     spine = _rows(node, "spine", [[0, 0, 0], [0, 1, 0]])
     section = _rows(node, "crossSection", [[1, 1], [1, -1], [-1, -1], [-1, 1], [1, 1]])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.vrml.parser import Proto, Scene, parse_vrml
 from robots.shapes.files.vrml.source import Count, Source, load
 from robots.shapes.polygons import Effort
@@ -38,7 +38,7 @@ class Files:
         """Return a file's scene, after reading it and the files of its EXTERNPROTOs.
 
         Raises:
-            MeshError: If one of the files cannot be read.
+            ShapeError: If one of the files cannot be read.
         """
         unlinked = self._read(path, progress)
         while unlinked:
@@ -64,7 +64,7 @@ class Files:
         if path in self.scenes:
             return []
         if len(self.scenes) >= _MOST_FILES:
-            raise MeshError(path, f"is one file too many: a scene may use {_MOST_FILES}")
+            raise ShapeError(path, f"is one file too many: a scene may use {_MOST_FILES}")
         source = load(path)
         source.count = self._count
         self.effort.read(len(source.text))
@@ -114,7 +114,7 @@ def _names(address: str) -> list[str]:
 
 
 def _refuse_cycle(start: Proto) -> None:
-    """Raise MeshError if a PROTO contains itself, which is possible only through other files."""
+    """Raise ShapeError if a PROTO contains itself, which is possible only through other files."""
     seen: set[int] = set()
     pending = [start]
     while pending:

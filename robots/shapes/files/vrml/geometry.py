@@ -14,7 +14,7 @@ from robots.shapes.files.vrml.extrusion import extrusion
 from robots.shapes.files.vrml.parser import Node
 from robots.shapes.files.vrml.protos import node_of
 from robots.shapes.files.vrml.values import flag, indices, number, numbers, rows
-from robots.shapes.mesh import FloatArray, IndexArray, unit
+from robots.shapes.geometry import FloatArray, IndexArray, unit
 from robots.shapes.normals import creased
 from robots.shapes.polygons import Effort
 from robots.shapes.solids import ball, box, turned

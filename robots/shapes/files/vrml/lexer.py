@@ -19,9 +19,9 @@ from enum import Enum
 
 import numpy as np
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.vrml.source import Source
-from robots.shapes.mesh import FloatArray
+from robots.shapes.geometry import FloatArray
 
 
 class Kind(Enum):
@@ -83,7 +83,7 @@ class Lexer:
         """Move to the next token; after the last, stay at the end.
 
         Raises:
-            MeshError: If a string does not end.
+            ShapeError: If a string does not end.
         """
         match = _TOKEN.match(self._all, self._after_blanks(self._end))
         name = match.lastgroup if match is not None else None
@@ -121,7 +121,7 @@ class Lexer:
         text = self.text.split()[0] if self.kind is Kind.NUMBERS else self.text
         return repr(text if len(text) <= 40 else text[:40] + "…")
 
-    def expected(self, what: str) -> MeshError:
+    def expected(self, what: str) -> ShapeError:
         """Return an error that says what was expected instead of the current token."""
         return self.source.error(self.start, f"{what} was expected, not {self.found()}")
 
@@ -129,7 +129,7 @@ class Lexer:
         """Return the numbers of consecutive NUMBERS tokens, which comments separate, and move past them.
 
         Raises:
-            MeshError: If a number is too large.
+            ShapeError: If a number is too large.
         """
         values: list[float] = []
         while self.kind is Kind.NUMBERS:

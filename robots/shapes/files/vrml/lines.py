@@ -13,7 +13,7 @@ from robots.shapes.files.vrml.geometry import checked, runs, table_of
 from robots.shapes.files.vrml.parser import Node
 from robots.shapes.files.vrml.protos import node_of
 from robots.shapes.files.vrml.values import flag, indices, rows
-from robots.shapes.mesh import FloatArray, IndexArray
+from robots.shapes.geometry import FloatArray, IndexArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,10 +17,10 @@ from sys import intern
 
 import numpy as np
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.vrml.lexer import Kind, Lexer
 from robots.shapes.files.vrml.source import Source
-from robots.shapes.mesh import FloatArray
+from robots.shapes.geometry import FloatArray
 
 # A scene that is nested deeper is damaged, or meant to exhaust the stack.
 MAX_DEPTH = 120
@@ -50,7 +50,7 @@ class Node:
     name: str = ""
     proto: "Proto | None" = None
 
-    def error(self, reason: str) -> MeshError:
+    def error(self, reason: str) -> ShapeError:
         """Return an error with the node's place and type."""
         return self.source.error(self.position, f"{self.type}: {reason}")
 
@@ -102,7 +102,7 @@ def parse_vrml(source: Source, progress: Callable[[float], None] | None = None) 
     """Parse a VRML 2.0 text.
 
     Raises:
-        MeshError: If it is not VRML 2.0; the error has the line and column.
+        ShapeError: If it is not VRML 2.0; the error has the line and column.
     """
     parser = _Parser(Lexer(source, progress), {}, {}, [])
     return Scene(source, parser.statements(""), parser.protos, parser.externals)
@@ -145,7 +145,7 @@ class _Parser:
             return False
         keyword = lexer.text
         lexer.advance()
-        if keyword == "ROUTE":  # nothing moves in a mesh
+        if keyword == "ROUTE":  # nothing moves in a shape
             self.name("a node and its event")
             if not lexer.is_word("TO"):
                 raise lexer.expected("TO")

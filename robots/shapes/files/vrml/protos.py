@@ -22,7 +22,7 @@ def resolved(node: Node) -> Node | None:
     """Return the standard node that a node resolves to; None for an empty PROTO.
 
     Raises:
-        MeshError: If a PROTO contains itself.
+        ShapeError: If a PROTO contains itself.
     """
     step: Node | None = node
     for _ in range(MAX_DEPTH):

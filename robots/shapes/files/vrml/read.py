@@ -10,7 +10,7 @@ import numpy as np
 
 from robots.shapes.files.vrml.drawing import Drawing
 from robots.shapes.files.vrml.files import Files
-from robots.shapes.mesh import Mesh
+from robots.shapes.geometry import Geometry
 
 # Share of the time that parsing takes.
 _READ = 0.7
@@ -18,7 +18,7 @@ _READ = 0.7
 
 def read_vrml(
     path: Path, progress: Callable[[float], None] | None = None, *, within: Path | None = None
-) -> Mesh:
+) -> Geometry:
     """Return the content of a .wrl file, in the file's units and axes; Inline files are read too.
 
     A robot's joints are at zero.
@@ -28,7 +28,7 @@ def read_vrml(
         within: Only files below this folder are read; files elsewhere count as missing.
 
     Raises:
-        MeshError: If it is not a readable VRML 2.0 file; the error has the line and column.
+        ShapeError: If it is not a readable VRML 2.0 file; the error has the line and column.
     """
     report = progress if progress is not None else _ignore_progress
     files = Files(within)
@@ -43,7 +43,7 @@ def read_vrml(
         report(1.0 - (1.0 - _READ) * len(pending) / count)
     report(1.0)
     drawing.warn_of_skipped()
-    return Mesh(
+    return Geometry(
         tuple(drawing.parts),
         wires=tuple(drawing.wires),
         warnings=tuple(files.warnings()),

@@ -6,7 +6,7 @@ import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 
 # gzip shrinks text by a factor of 5 to 20. A file that unpacks to 100 times its size is an attack.
 _MOST_UNPACKED = 100
@@ -47,9 +47,9 @@ class Source:
         last = max(text.rfind("\n", 0, position), text.rfind("\r", 0, position))
         return f"line {ends[0] + ends[1] - ends[2] + 1}, column {position - last}"
 
-    def error(self, position: int, reason: str) -> MeshError:
+    def error(self, position: int, reason: str) -> ShapeError:
         """Return an error at a position."""
-        return MeshError(self.path, _short(reason), place=self.place(position))
+        return ShapeError(self.path, _short(reason), place=self.place(position))
 
     def warn(self, position: int, warning: str, *, once: str = "") -> None:
         """Record a warning at a position; of warnings with the same `once`, only the first."""
@@ -71,19 +71,19 @@ def load(path: Path) -> Source:
     """Read a .wrl file, or a .wrz file, which is compressed with gzip.
 
     Raises:
-        MeshError: If it cannot be read, or is not VRML 2.0.
+        ShapeError: If it cannot be read, or is not VRML 2.0.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise MeshError(path, f"cannot be read: {error.strerror}") from error
+        raise ShapeError(path, f"cannot be read: {error.strerror}") from error
     if data[:2] == b"\x1f\x8b":
         data = _unpacked(data, path)
     data = data.removeprefix(codecs.BOM_UTF8).rstrip(b"\0")
     if not data.strip():
-        raise MeshError(path, "is empty; a VRML 2.0 file begins with '#VRML V2.0 utf8'")
+        raise ShapeError(path, "is empty; a VRML 2.0 file begins with '#VRML V2.0 utf8'")
     if b"\0" in data[:1024]:
-        raise MeshError(path, "is not VRML 2.0: it contains binary data")
+        raise ShapeError(path, "is not VRML 2.0: it contains binary data")
     try:
         source = Source(path, data.decode("utf-8"))
     except UnicodeDecodeError as error:
@@ -99,11 +99,11 @@ def _unpacked(data: bytes, path: Path) -> bytes:
     try:
         unpacked = unpacker.decompress(data, most)
     except zlib.error as error:
-        raise MeshError(path, f"is gzip data, but damaged: {error}") from error
+        raise ShapeError(path, f"is gzip data, but damaged: {error}") from error
     if unpacker.unconsumed_tail:
-        raise MeshError(path, f"unpacks to more than {most >> 20} MiB, too much for a mesh of its size")
+        raise ShapeError(path, f"unpacks to more than {most >> 20} MiB, too much for a mesh of its size")
     if not unpacker.eof:
-        raise MeshError(path, "is gzip data, but truncated")
+        raise ShapeError(path, "is gzip data, but truncated")
     return unpacked
 
 
@@ -116,7 +116,7 @@ def _check_header(source: Source) -> None:
         raise source.error(0, f"is {words[1]}; only VRML 2.0 is read: convert it first")
     if words[:3] != ["#", "VRML", "V2.0"]:
         if "{" not in source.text:
-            raise MeshError(
+            raise ShapeError(
                 source.path, f"is not VRML 2.0: it begins with {first[:40]!r}, not '#VRML V2.0 utf8'"
             )
         source.warn(0, "the header '#VRML V2.0 utf8' is missing; read as VRML 2.0")

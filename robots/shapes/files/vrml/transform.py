@@ -5,7 +5,7 @@ import numpy as np
 from robots.schema.poses import axis_rotation
 from robots.shapes.files.vrml.parser import Node
 from robots.shapes.files.vrml.values import numbers
-from robots.shapes.mesh import FloatArray
+from robots.shapes.geometry import FloatArray
 
 
 def transform_matrix(node: Node) -> FloatArray:

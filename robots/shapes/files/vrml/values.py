@@ -6,14 +6,14 @@ from typing import cast
 import numpy as np
 
 from robots.shapes.files.vrml.parser import Node
-from robots.shapes.mesh import Color, FloatArray, IndexArray
+from robots.shapes.geometry import Color, FloatArray, IndexArray
 
 
 def numbers(node: Node, name: str, default: Sequence[float], count: int | None = None) -> FloatArray:
     """Return a field's numbers.
 
     Raises:
-        MeshError: If they are not numbers, or not `count` of them.
+        ShapeError: If they are not numbers, or not `count` of them.
     """
     value = node.fields.get(name)
     if value is None:

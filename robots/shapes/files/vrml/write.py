@@ -3,23 +3,23 @@
 import re
 from collections.abc import Iterator
 
-from robots.shapes.mesh import FloatArray, IndexArray, Material, Mesh, Part
+from robots.shapes.geometry import FloatArray, Geometry, IndexArray, Material, Part
 
 _DECIMALS = 3
 
 
-def write_vrml(mesh: Mesh, *, decimals: int = _DECIMALS) -> str:
-    """Return the text of a .wrl file; the same mesh gives the same text.
+def write_vrml(geometry: Geometry, *, decimals: int = _DECIMALS) -> str:
+    """Return the text of a .wrl file; the same shape gives the same text.
 
     Args:
         decimals: Decimals of vertex coordinates.
     """
-    return "\n".join(["#VRML V2.0 utf8", *_lines(mesh, decimals)]) + "\n"
+    return "\n".join(["#VRML V2.0 utf8", *_lines(geometry, decimals)]) + "\n"
 
 
-def _lines(mesh: Mesh, decimals: int) -> Iterator[str]:
+def _lines(geometry: Geometry, decimals: int) -> Iterator[str]:
     written: dict[Material, str] = {}
-    for part in mesh.parts:
+    for part in geometry.parts:
         yield "Shape {"
         yield from _appearance(part.material, written)
         yield from _face_set(part, decimals)

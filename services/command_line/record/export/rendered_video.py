@@ -15,13 +15,13 @@ from renderer.pictures.composition import RobotSnapshot, compose
 from renderer.pictures.overlay import write_over
 from renderer.pictures.requested_views import ViewSpec
 from renderer.pictures.robot_state import Ages, RobotState
-from renderer.scene.appearance import appearance_of, mesh_name, placements_at
+from renderer.scene.appearance import appearance_of, placements_at, shape_name
 from renderer.shapes.cache import cache_folder
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.record.export.errors import ExportError
-from services.command_line.record.export.meshes import recorded_mesh
+from services.command_line.record.export.shapes import recorded_shape
 from services.command_line.record.export.span import Span, decoded, needed, topics_of
 from services.command_line.record.export.tables import description_of
 from services.command_line.terminal.output import progress
@@ -70,7 +70,7 @@ def write_rendered(
     )
     mp4, key_each = FragmentedMp4(), max(round(_KEY_FRAME_EACH_S * rendering.fps), 1)
     try:
-        _take_meshes(file, state.appearance.description, studio)
+        _take_shapes(file, state.appearance.description, studio)
         encoder = open_encoder(rendering.size, rendering.fps)
         with target.open("wb") as stream, progress("video") as report:
             for number, (time_ns, ages) in enumerate(_pictures(file, span, state, rendering.fps)):
@@ -115,14 +115,14 @@ def _robot(file: RecordingFile) -> RobotState:
     return RobotState(site, robot, appearance=appearance_of(description))
 
 
-def _take_meshes(file: RecordingFile, description: schema.Description, studio: Studio) -> None:
+def _take_shapes(file: RecordingFile, description: schema.Description, studio: Studio) -> None:
     bodies: list[schema.Description.Link | schema.Description.Fixture] = [
         *description.links,
         *description.fixtures,
     ]
     for body in bodies:
         if body.mesh:
-            studio.add_mesh(mesh_name(body), recorded_mesh(file, body), body.color)
+            studio.add_shape(shape_name(body), recorded_shape(file, body), body.color)
 
 
 def _pictures(file: RecordingFile, span: Span, state: RobotState, fps: float) -> Iterator[tuple[int, Ages]]:

@@ -27,10 +27,10 @@ from robomesh.recordings.series.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.shapes.files.gltf import glb_to_z_up, read_glb
 from services.command_line.record.export.errors import ExportError
-from services.command_line.record.export.meshes import recorded_mesh
 from services.command_line.record.export.plots import COLORS, panels_of
 from services.command_line.record.export.recorded_video import recorded_pictures
 from services.command_line.record.export.rerun_layout import PUBLISHER_TIME, RECEIVE_TIME, blueprint
+from services.command_line.record.export.shapes import recorded_shape
 from services.command_line.record.export.span import Span, decoded, topics_of
 from services.command_line.record.export.tables import description_of
 from services.command_line.terminal.output import print_line, progress
@@ -163,15 +163,15 @@ class _Export:
         if self._description is None:
             return
         for link in self._description.links:
-            self._write_mesh(["links", link.name], link, f"{self._frame_prefix}{link.name}", np.eye(4))
+            self._write_shape(["links", link.name], link, f"{self._frame_prefix}{link.name}", np.eye(4))
         for fixture in self._description.fixtures:
             fixture_to_site = np.array(fixture.fixture_to_site).reshape(4, 4)
-            self._write_mesh(["fixtures", fixture.name], fixture, self._site, fixture_to_site)
+            self._write_shape(["fixtures", fixture.name], fixture, self._site, fixture_to_site)
         for frame in self._description.frames:
             axes = rr.TransformAxes3D(_TOOL_AXES_M), rr.CoordinateFrame(f"{self._frame_prefix}{frame.name}")
             self._log(["named_frames", frame.name], *axes)
 
-    def _write_mesh(
+    def _write_shape(
         self,
         path: Sequence[str],
         body: schema.Description.Link | schema.Description.Fixture,
@@ -182,19 +182,19 @@ class _Export:
         if not body.mesh:
             return
         try:
-            glb = recorded_mesh(self._file, body)
+            glb = recorded_shape(self._file, body)
         except ExportError as error:
             print_line(f"robomesh: without a body: {error}", err=True)
             return
         # Rerun draws the file's own axes, which glTF defines as y up.
-        mesh_to_parent = body_to_parent @ glb_to_z_up(glb)
+        shape_to_parent = body_to_parent @ glb_to_z_up(glb)
         own = any(each.color or each.colors is not None for each in read_glb(glb))
         color = None if own or not body.color else _rgb(body.color)
         self._log(
             path,
             rr.Asset3D(contents=glb, media_type=rr.MediaType.GLB, albedo_factor=color),
             rr.Transform3D(
-                translation=mesh_to_parent[:3, 3], mat3x3=mesh_to_parent[:3, :3], parent_frame=parent
+                translation=shape_to_parent[:3, 3], mat3x3=shape_to_parent[:3, :3], parent_frame=parent
             ),
         )
 

@@ -14,7 +14,7 @@ const MUTED = 0.6;
 const STALE_OPACITY = 0.38;
 const FIXTURE_OPACITY = 0.7;
 const FIXTURE_COLOUR = "#6f7c88";
-const NO_COLOUR = 0xcccccc; // placeholder of models without colour: see robots/shapes/mesh.py
+const NO_COLOUR = 0xcccccc; // placeholder of models without colour: see robots/shapes/geometry.py
 const EDGE_ANGLE = 30; // degrees: sharper ones are drawn
 const MOST_CORNERS = 100_000; // finding the edges of more takes too long
 

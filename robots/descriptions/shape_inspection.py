@@ -1,4 +1,4 @@
-"""Inspection of a robot's meshes: opens and measures each file."""
+"""Inspection of a robot's shapes: opens and measures each file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from pathlib import Path, PureWindowsPath
 
 import numpy as np
 
-from robots.descriptions.glb import link_mesh
+from robots.descriptions.glb import link_geometry
 from robots.kinematics.joints import doubt_notes
 from robots.kinematics.kinematic_tree import Shape, tree_of
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.schema.robot_toml import RobotDescription, UrdfDescription, similar
-from robots.shapes.mesh import bounds
+from robots.shapes.geometry import bounds
 
 # A robot's folder has fewer; another one, such as a home, may have millions.
 _MOST_FILES, _MOST_HINTS = 5_000, 20
@@ -21,45 +21,45 @@ _LARGEST_M, _SMALLEST_M = 10.0, 1e-3
 
 
 @dataclass(frozen=True)
-class Finding:
+class FileNote:
     """A problem or a warning, with its file."""
 
     file: str
     text: str
 
 
-def mesh_findings(description: RobotDescription) -> tuple[list[Finding], list[Finding]]:
-    """Return the problems of a robot's meshes and the warnings."""
+def inspect_shapes(description: RobotDescription) -> tuple[list[FileNote], list[FileNote]]:
+    """Return the problems of a robot's shapes and the warnings."""
     problems, warnings = [], []
     if isinstance(description, UrdfDescription):
         source = str(description.source)
         hints = _nearest(description.robot.missing[:_MOST_HINTS], description.source.parent)
         problems += [
-            Finding(source, f"mesh {name!r}: no such file{hints.get(name, '')}")
+            FileNote(source, f"mesh {name!r}: no such file{hints.get(name, '')}")
             for name in description.robot.missing
         ]
-        warnings += [Finding(source, note) for note in (*description.robot.notes, *doubt_notes(description))]
+        warnings += [FileNote(source, note) for note in (*description.robot.notes, *doubt_notes(description))]
     for link in tree_of(description).links:
         for shape in (*link.shapes, *link.collision):
-            if not isinstance(shape.mesh, Path):
+            if not isinstance(shape.source, Path):
                 continue
-            file, subject = str(shape.mesh), f"link {link.name!r}"
+            file, subject = str(shape.source), f"link {link.name!r}"
             try:
-                mesh = link_mesh([shape])
-            except MeshError as error:
+                geometry = link_geometry([shape])
+            except ShapeError as error:
                 place = f"{error.place}: " if error.place else ""
-                problems.append(Finding(error.source, f"{place}{error.reason}"))
+                problems.append(FileNote(error.source, f"{place}{error.reason}"))
                 continue
-            warnings += [Finding(file, warning) for warning in mesh.warnings]
-            if mesh.triangle_count == 0:
-                if not mesh.wires:
-                    problems.append(Finding(file, f"{subject}: has no triangles, so the link is invisible"))
+            warnings += [FileNote(file, warning) for warning in geometry.warnings]
+            if geometry.triangle_count == 0:
+                if not geometry.wires:
+                    problems.append(FileNote(file, f"{subject}: has no triangles, so the link is invisible"))
                 continue
-            size = float(np.ptp(bounds(mesh), axis=0).max())
+            size = float(np.ptp(bounds(geometry), axis=0).max())
             if not _SMALLEST_M <= size <= _LARGEST_M:
                 scale = _scale(shape)
                 text = f"{subject}: is {size:.3g} m large at {scale:g} m per unit; check mesh_scale"
-                warnings.append(Finding(file, text))
+                warnings.append(FileNote(file, text))
     return problems, warnings
 
 

@@ -7,7 +7,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.record.export.errors import ExportError
 
 
-def recorded_mesh(file: RecordingFile, body: schema.Description.Link | schema.Description.Fixture) -> bytes:
+def recorded_shape(file: RecordingFile, body: schema.Description.Link | schema.Description.Fixture) -> bytes:
     """Return a body's GLB from the recording, or from this machine's cache.
 
     Raises:

@@ -1,10 +1,10 @@
-"""Mesh commands read a file and others of its folder, and no other file that it names."""
+"""Commands for files with shapes read one file and others of its folder, and no other file that it names."""
 
 import json
 
 import pytest
 
-from services.command_line.robots import mesh
+from services.command_line.robots import shapes
 
 BOX = "#VRML V2.0 utf8\nShape { geometry Box { } }\n"
 
@@ -26,14 +26,14 @@ def test_file_outside_of_the_folder_counts_as_missing(folder, address, capsys):
     named = address.format(outside=folder.parent)
     path = folder / "a.wrl"
     path.write_text(f'{BOX}Inline {{ url "{named}" }}\nInline {{ url "parts/box.wrl" }}\n')
-    mesh.info(path, True)
+    shapes.info(path, True)
     printed = json.loads(capsys.readouterr().out)
     assert printed["triangles"] == 24
     assert (
         "no such file in the folder 'open'; other folders are not read; it is left out"
         in printed["warnings"][0]
     )
-    mesh.convert(path, folder / "a.glb", None, None)
+    shapes.convert(path, folder / "a.glb", None, None)
     capsys.readouterr()
-    mesh.info(folder / "a.glb", True)
+    shapes.info(folder / "a.glb", True)
     assert json.loads(capsys.readouterr().out)["triangles"] == 24

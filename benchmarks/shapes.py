@@ -1,6 +1,6 @@
 """Time and memory for reading mesh files, compared with VTK's importers in the same run.
 
-    ./dev run python benchmarks/meshes.py [--runs 5] [--vtk-python PYTHON] [--large] [--json]
+    ./dev run python benchmarks/shapes.py [--runs 5] [--vtk-python PYTHON] [--large] [--json]
 
 The program makes the files: a wavy plate of 50,000 triangles in each format (3DS holds it in five objects),
 and with --large one of 1,000,000 as VRML, with its progress. Each reading is a separate process, and both
@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from robots.shapes.files.read import read_mesh
+from robots.shapes.files.read import read_geometry
 from robots.shapes.files.three_ds.write import write_3ds
 from robots.shapes.files.write_glb import glb_of
 from robots.shapes.files.write_others import write_obj, write_ply, write_stl
-from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.geometry import Geometry, Material, Part
 from robots.shapes.normals import creased
 
 VTK = {
@@ -131,13 +131,13 @@ def _reading(_who: str, file: str) -> dict[str, Any]:
     # Current, not peak, memory: memory that the imports used and freed must not hide the reader's use.
     before = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
     start = time.perf_counter()
-    mesh = read_mesh(path, calls.append)
+    geometry = read_geometry(path, calls.append)
     seconds = time.perf_counter() - start
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 - before
     return {
         "seconds": seconds,
         "bytes": grown,
-        "triangles": mesh.triangle_count,
+        "triangles": geometry.triangle_count,
         "progress_calls": len(calls),
     }
 
@@ -156,7 +156,7 @@ print(json.dumps({"seconds": time.perf_counter() - start}))
 """
 
 
-def plate(count: int) -> Mesh:
+def plate(count: int) -> Geometry:
     """Return a wavy plate of about that number of triangles."""
     side = round((count / 2) ** 0.5)
     x, y = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
@@ -168,23 +168,25 @@ def plate(count: int) -> Mesh:
             np.column_stack([corner, corner + side + 2, corner + side + 1]),
         ]
     )
-    return Mesh((Part("plate", Material("steel", (0.5, 0.6, 0.7)), *creased(vertices, triangles, np.pi)),))
+    return Geometry(
+        (Part("plate", Material("steel", (0.5, 0.6, 0.7)), *creased(vertices, triangles, np.pi)),)
+    )
 
 
-def _in_pieces(mesh: Mesh, pieces: int) -> Mesh:
-    (part,) = mesh.parts
+def _in_pieces(geometry: Geometry, pieces: int) -> Geometry:
+    (part,) = geometry.parts
     parts = []
     for triangles in np.array_split(part.triangles, pieces):
         used, faces = np.unique(triangles, return_inverse=True)
         parts.append(
             Part(part.name, part.material, part.vertices[used], part.normals[used], faces.reshape(-1, 3))
         )
-    return Mesh(tuple(parts))
+    return Geometry(tuple(parts))
 
 
-def _vrml(mesh: Mesh) -> bytes:
+def _vrml(geometry: Geometry) -> bytes:
     """Return VRML as CAD programs write it: points and faces, without normals."""
-    (part,) = mesh.parts
+    (part,) = geometry.parts
     points = ",\n".join(f"{x:.6f} {y:.6f} {z:.6f}" for x, y, z in part.vertices.tolist())
     faces = ",\n".join(f"{a}, {b}, {c}, -1" for a, b, c in part.triangles.tolist())
     return (
@@ -194,11 +196,11 @@ def _vrml(mesh: Mesh) -> bytes:
     ).encode()
 
 
-WRITERS: Mapping[str, Callable[[Mesh], bytes]] = {
+WRITERS: Mapping[str, Callable[[Geometry], bytes]] = {
     ".wrl": _vrml,
-    ".3ds": lambda mesh: write_3ds(_in_pieces(mesh, 5)),
+    ".3ds": lambda geometry: write_3ds(_in_pieces(geometry, 5)),
     ".stl": write_stl,
-    ".obj": lambda mesh: write_obj(mesh, "none.mtl")[0].replace("mtllib none.mtl\n", "").encode(),
+    ".obj": lambda geometry: write_obj(geometry, "none.mtl")[0].replace("mtllib none.mtl\n", "").encode(),
     ".ply": write_ply,
     ".glb": glb_of,
 }

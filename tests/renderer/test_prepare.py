@@ -11,45 +11,45 @@ import pytest
 from renderer.errors import GlbError
 from renderer.shapes import cache
 from renderer.shapes.prepare import prepared
-from robots.schema.errors import MeshError
+from robots.schema.errors import ShapeError
 from robots.shapes.files.gltf import glb_to_z_up, read_glb
 from tests.renderer.bodies import ball, cube
 
 RED = (1.0, 0.0, 0.0, 1.0)
 
 
-def area(mesh):
-    a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
+def area(geometry):
+    a, b, c = (geometry.positions[geometry.triangles[:, corner]] for corner in range(3))
     return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
 
 def test_a_cube_keeps_its_flat_faces_and_its_twelve_edges():
-    mesh = prepared(cube(0.5))
-    assert len(mesh.triangles) == 12
+    geometry = prepared(cube(0.5))
+    assert len(geometry.triangles) == 12
     # Each of the 8 corners once for each adjacent face.
-    assert len(mesh.positions) == 24
-    assert np.isclose(np.abs(mesh.normals).max(axis=1), 1.0).all()
-    assert len(mesh.edges) == 2 * 12
-    assert area(mesh) == pytest.approx(6.0)
+    assert len(geometry.positions) == 24
+    assert np.isclose(np.abs(geometry.normals).max(axis=1), 1.0).all()
+    assert len(geometry.edges) == 2 * 12
+    assert area(geometry) == pytest.approx(6.0)
 
 
 def test_a_ball_is_smooth_and_has_no_edges():
-    mesh = prepared(ball(0.3))
-    outwards = mesh.positions / np.linalg.norm(mesh.positions, axis=1, keepdims=True)
-    assert (outwards * mesh.normals).sum(axis=1).min() > 0.98
-    assert len(mesh.edges) == 0
+    geometry = prepared(ball(0.3))
+    outwards = geometry.positions / np.linalg.norm(geometry.positions, axis=1, keepdims=True)
+    assert (outwards * geometry.normals).sum(axis=1).min() > 0.98
+    assert len(geometry.edges) == 0
 
 
-def test_a_heavy_mesh_is_simplified_and_keeps_its_size():
+def test_a_heavy_shape_is_simplified_and_keeps_its_size():
     heavy = ball(0.3, rings=80, sectors=100)
-    mesh = prepared(heavy, most_triangles=1000)
-    assert 300 < len(mesh.finest) <= 1000
-    assert len(mesh.shadow) // 3 < 400
-    assert np.abs(mesh.positions).max() == pytest.approx(0.3, rel=0.02)
-    assert area(mesh) == pytest.approx(4 * np.pi * 0.09, rel=0.03)
+    geometry = prepared(heavy, most_triangles=1000)
+    assert 300 < len(geometry.finest) <= 1000
+    assert len(geometry.shadow) // 3 < 400
+    assert np.abs(geometry.positions).max() == pytest.approx(0.3, rel=0.02)
+    assert area(geometry) == pytest.approx(4 * np.pi * 0.09, rel=0.03)
 
 
-def test_a_node_places_its_mesh():
+def test_a_node_places_its_shape():
     quarter_turn_about_z = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
     node = {"translation": [1.0, 2.0, 3.0], "rotation": quarter_turn_about_z, "scale": [2.0, 1.0, 1.0]}
     positions = prepared(cube(0.5, node=node)).positions
@@ -59,8 +59,8 @@ def test_a_node_places_its_mesh():
 
 
 def test_a_mirrored_node_still_shows_its_outside():
-    mesh = prepared(cube(0.5, node={"scale": [-1.0, 1.0, 1.0]}))
-    assert ((mesh.positions * mesh.normals).sum(axis=1) > 0).all()
+    geometry = prepared(cube(0.5, node={"scale": [-1.0, 1.0, 1.0]}))
+    assert ((geometry.positions * geometry.normals).sum(axis=1) > 0).all()
 
 
 @pytest.mark.parametrize(
@@ -72,14 +72,14 @@ def test_a_mirrored_node_still_shows_its_outside():
     ],
 )
 def test_the_files_colour_takes_precedence_over_the_descriptions(color, said, painted):
-    mesh = prepared(cube(0.5, color=color), color=said)
-    assert tuple(mesh.colors[0]) == painted
-    assert mesh.transparent == (painted[3] < 255)
+    geometry = prepared(cube(0.5, color=color), color=said)
+    assert tuple(geometry.colors[0]) == painted
+    assert geometry.transparent == (painted[3] < 255)
 
 
-def test_an_empty_mesh_is_empty():
-    mesh = prepared(b"glTF" + struct.pack("<II", 2, 22) + struct.pack("<II", 2, 0x4E4F534A) + b"{}")
-    assert len(mesh.triangles) == 0
+def test_an_empty_shape_is_empty():
+    geometry = prepared(b"glTF" + struct.pack("<II", 2, 22) + struct.pack("<II", 2, 0x4E4F534A) + b"{}")
+    assert len(geometry.triangles) == 0
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_json_of_another_shape_is_rejected_or_has_no_surface(document):
     text += b" " * (-len(text) % 4)
     data = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
     for read in (read_glb, glb_to_z_up):
-        with contextlib.suppress(MeshError):
+        with contextlib.suppress(ShapeError):
             read(data)
 
 
@@ -130,11 +130,11 @@ def test_nodes_that_form_a_cycle_are_rejected():
 def test_a_file_truncated_anywhere_is_an_error():
     whole = cube(0.5)
     for length in range(len(whole)):
-        with pytest.raises(MeshError):
+        with pytest.raises(ShapeError):
             read_glb(whole[:length])
 
 
-def test_a_mesh_is_prepared_once(tmp_path, monkeypatch):
+def test_a_shape_is_prepared_once(tmp_path, monkeypatch):
     glb = ball(0.3)
     first = cache.prepared_once(glb, color="#102030", folder=tmp_path)
     monkeypatch.setattr(cache, "prepared", None)
@@ -157,7 +157,7 @@ def test_a_damaged_or_unwritable_cache_is_harmless(tmp_path):
     cache.store_glb(glb, no_folder)
 
 
-def test_a_damaged_stored_mesh_is_not_used(tmp_path):
+def test_a_damaged_stored_shape_is_not_used(tmp_path):
     cache.store_glb(b"some mesh", tmp_path)
     (path,) = tmp_path.iterdir()
     assert cache.stored_glb(path.stem, tmp_path) == b"some mesh"

@@ -1,4 +1,4 @@
-"""Robots' meshes as files, because RViz cannot fetch them from the mesh."""
+"""Robots' shapes as files, because RViz cannot fetch them from the shape."""
 
 import asyncio
 import hashlib
@@ -10,26 +10,26 @@ from robomesh.errors import RobomeshError
 from robomesh.files.atomic_write import write_atomically
 from robomesh.schemas.robomesh_pb2 import Description
 from robomesh.wire.session import Session
-from services.viewers.robots import meshes_of
+from services.viewers.robots import shapes_of
 
 log = logging.getLogger(__name__)
 
 _WITHIN_S = 10.0
 
 
-class Meshes:
+class ShapeFiles:
     """Folder of GLB files, named by their content's hash."""
 
     def __init__(self, session: Session, folder: Path) -> None:
         self._session, self._folder = session, folder
 
     async def of(self, site: str, robot: str, description: Description) -> dict[str, str]:
-        """Return the URI of each mesh, by the mesh's name; without those that cannot be fetched."""
-        hashes = meshes_of(description).items()
-        paths = {mesh: await self._path(site, robot, mesh, sha256) for mesh, sha256 in hashes}
-        return {mesh: path.as_uri() for mesh, path in paths.items() if path}
+        """Return the URI of each shape, by the shape's name; without those that cannot be fetched."""
+        hashes = shapes_of(description).items()
+        paths = {shape: await self._path(site, robot, shape, sha256) for shape, sha256 in hashes}
+        return {shape: path.as_uri() for shape, path in paths.items() if path}
 
-    async def _path(self, site: str, robot: str, mesh: str, sha256: str) -> Path | None:
+    async def _path(self, site: str, robot: str, shape: str, sha256: str) -> Path | None:
         path = self._folder / f"{sha256}.glb"
         # The hash comes from another program: check it before it is part of a path.
         if len(sha256) != 64 or not sha256.isalnum():
@@ -37,12 +37,12 @@ class Meshes:
         if await asyncio.to_thread(path.exists):
             return path
         try:
-            data = await self._session.ask_bytes(robot_key(site, robot, f"mesh/{mesh}"), timeout_s=_WITHIN_S)
+            data = await self._session.ask_bytes(robot_key(site, robot, f"mesh/{shape}"), timeout_s=_WITHIN_S)
             if hashlib.sha256(data).hexdigest() != sha256:
                 return None
             await asyncio.to_thread(_save, path, data)
         except (RobomeshError, OSError) as error:
-            log.warning("no mesh %s of %s/%s: %s", mesh, site, robot, error)
+            log.warning("no mesh %s of %s/%s: %s", shape, site, robot, error)
             return None
         return path
 

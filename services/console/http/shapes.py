@@ -1,4 +1,4 @@
-"""Link meshes for the page: requested from their gateways, cached by their hash."""
+"""Link shapes for the page: requested from their gateways, cached by their hash."""
 
 import hashlib
 from collections import OrderedDict
@@ -19,32 +19,32 @@ _MOST_BYTES = 256 * 1024 * 1024
 _TIMEOUTS_S = (2.0, 5.0, 10.0)
 
 
-class MeshCache:
+class ShapeCache:
     """GLB bytes by their SHA-256; evicts the least recently used."""
 
     def __init__(self) -> None:
-        self._meshes: OrderedDict[str, bytes] = OrderedDict()
+        self._shapes: OrderedDict[str, bytes] = OrderedDict()
         self._bytes = 0
 
     def get(self, sha256: str) -> bytes | None:
         """Return the bytes with that hash, or None."""
-        if sha256 in self._meshes:
-            self._meshes.move_to_end(sha256)
-        return self._meshes.get(sha256)
+        if sha256 in self._shapes:
+            self._shapes.move_to_end(sha256)
+        return self._shapes.get(sha256)
 
     def put(self, sha256: str, data: bytes) -> None:
         """Store bytes, and evict others if there are too many."""
-        if sha256 not in self._meshes:
-            self._meshes[sha256] = data
+        if sha256 not in self._shapes:
+            self._shapes[sha256] = data
             self._bytes += len(data)
-        while self._bytes > _MOST_BYTES and len(self._meshes) > 1:
-            self._bytes -= len(self._meshes.popitem(last=False)[1])
+        while self._bytes > _MOST_BYTES and len(self._shapes) > 1:
+            self._bytes -= len(self._shapes.popitem(last=False)[1])
 
 
-async def mesh_response(request: Request, session: Session, cache: MeshCache) -> Response:
+async def shape_response(request: Request, session: Session, cache: ShapeCache) -> Response:
     """Handle `GET /mesh/<site>/<robot>/<name>?sha=<SHA-256>`.
 
-    A mesh with another hash is an error, so a browser may cache the response for good.
+    A shape with another hash is an error, so a browser may cache the response for good.
     """
     wanted = request.query_params.get("sha", "")
     data = cache.get(wanted)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robots.schema.errors import MeshError
-from robots.shapes.files.read import read_mesh
-from robots.shapes.mesh import Mesh, bounds
+from robots.schema.errors import ShapeError
+from robots.shapes.files.read import read_geometry
+from robots.shapes.geometry import Geometry, bounds
 
 ASCII_STL = """solid one
 facet normal 0 0 1
@@ -101,10 +101,10 @@ DAE = """<?xml version="1.0"?>
 """
 
 
-def read(folder: Path, name: str, content: str | bytes) -> Mesh:
+def read(folder: Path, name: str, content: str | bytes) -> Geometry:
     path = folder / name
     path.write_bytes(content.encode() if isinstance(content, str) else content)
-    return read_mesh(path)
+    return read_geometry(path)
 
 
 def binary_stl(*triangles: tuple[tuple[float, ...], ...], header: bytes = b"", count: int = -1) -> bytes:
@@ -116,48 +116,48 @@ TRIANGLE = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
 def test_text_stl_keeps_all_facets_and_solids(tmp_path: Path) -> None:
-    mesh = read(tmp_path, "a.stl", ASCII_STL)
-    assert [(part.name, len(part.triangles)) for part in mesh.parts] == [("one", 2), ("two", 1)]
-    np.testing.assert_array_equal(bounds(mesh), [[0, 0, 0], [5, 1, 0]])
-    assert (mesh.unit_m, mesh.up) == (None, "")
+    geometry = read(tmp_path, "a.stl", ASCII_STL)
+    assert [(part.name, len(part.triangles)) for part in geometry.parts] == [("one", 2), ("two", 1)]
+    np.testing.assert_array_equal(bounds(geometry), [[0, 0, 0], [5, 1, 0]])
+    assert (geometry.unit_m, geometry.up) == (None, "")
 
 
 @pytest.mark.parametrize("header", [b"", b"solid of a careless program"])
 def test_binary_stl_is_read_whatever_its_header(tmp_path: Path, header: bytes) -> None:
-    mesh = read(tmp_path, "a.stl", binary_stl(TRIANGLE, TRIANGLE, header=header))
-    assert mesh.triangle_count == 2  # twice the same: both are the file's
-    np.testing.assert_allclose(mesh.parts[0].normals[mesh.parts[0].triangles[0]], [[0, 0, 1]] * 3)
+    geometry = read(tmp_path, "a.stl", binary_stl(TRIANGLE, TRIANGLE, header=header))
+    assert geometry.triangle_count == 2  # twice the same: both are the file's
+    np.testing.assert_allclose(geometry.parts[0].normals[geometry.parts[0].triangles[0]], [[0, 0, 1]] * 3)
 
 
 def test_obj_keeps_polygons_materials_and_degenerate_faces(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text(MTL)
-    mesh = read(tmp_path, "a.obj", OBJ)
-    found = {part.material.name: part for part in mesh.parts}
+    geometry = read(tmp_path, "a.obj", OBJ)
+    found = {part.material.name: part for part in geometry.parts}
     assert {name: len(part.triangles) for name, part in found.items()} == {"red": 2, "glass": 2}
     assert found["red"].material.diffuse == (1.0, 0.0, 0.0)
     assert found["red"].material.shininess == 0.5
     assert found["glass"].material.transparency == 0.75
     assert found["glass"].material.texture == "wood.png"
-    assert mesh.warnings == (
+    assert geometry.warnings == (
         "1 lines or points are left out",
         "textures are kept by name, not drawn: wood.png",
     )
-    assert mesh.files == (tmp_path / "a.mtl", tmp_path / "wood.png")
+    assert geometry.files == (tmp_path / "a.mtl", tmp_path / "wood.png")
 
 
 def test_obj_without_its_materials_is_grey_with_a_warning(tmp_path: Path) -> None:
-    mesh = read(tmp_path, "a.obj", OBJ)
-    assert mesh.triangle_count == 4
-    assert mesh.warnings[0] == "materials: no file 'a.mtl' in this file's folder; drawn grey"
+    geometry = read(tmp_path, "a.obj", OBJ)
+    assert geometry.triangle_count == 4
+    assert geometry.warnings[0] == "materials: no file 'a.mtl' in this file's folder; drawn grey"
 
 
 def test_material_file_above_the_files_folder_counts_as_missing(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text(MTL)
     inner = tmp_path / "inner"
     inner.mkdir()
-    mesh = read(inner, "a.obj", OBJ.replace("a.mtl", "../a.mtl"))
-    assert mesh.warnings[0] == "materials: no file '../a.mtl' in this file's folder; drawn grey"
-    assert all(part.material.diffuse != (1.0, 0.0, 0.0) for part in mesh.parts)
+    geometry = read(inner, "a.obj", OBJ.replace("a.mtl", "../a.mtl"))
+    assert geometry.warnings[0] == "materials: no file '../a.mtl' in this file's folder; drawn grey"
+    assert all(part.material.diffuse != (1.0, 0.0, 0.0) for part in geometry.parts)
 
 
 def test_ply_gives_colours_of_vertices(tmp_path: Path) -> None:
@@ -175,18 +175,18 @@ def test_ply_gives_colours_of_vertices(tmp_path: Path) -> None:
 
 def test_ply_of_points_only_is_a_wire(tmp_path: Path) -> None:
     text = PLY[: PLY.index("element face")] + "end_header\n" + "0 0 0 255 0 0\n" * 4
-    mesh = read(tmp_path, "a.ply", text)
-    assert mesh.triangle_count == 0
-    assert mesh.wires[0].vertices.shape == (4, 3)
-    assert mesh.wires[0].colors is not None
-    assert mesh.wires[0].colors[0].tolist() == [1, 0, 0, 1]
+    geometry = read(tmp_path, "a.ply", text)
+    assert geometry.triangle_count == 0
+    assert geometry.wires[0].vertices.shape == (4, 3)
+    assert geometry.wires[0].colors is not None
+    assert geometry.wires[0].colors[0].tolist() == [1, 0, 0, 1]
 
 
 def test_dae_is_placed_by_its_nodes_in_its_own_unit(tmp_path: Path) -> None:
-    mesh = read(tmp_path, "a.dae", DAE)
-    np.testing.assert_allclose(bounds(mesh), [[10, 20, 30], [11, 21, 30]])
-    assert mesh.parts[0].material.diffuse == pytest.approx((0.2, 0.4, 0.6))
-    assert (mesh.unit_m, mesh.up) == (0.001, "z")
+    geometry = read(tmp_path, "a.dae", DAE)
+    np.testing.assert_allclose(bounds(geometry), [[10, 20, 30], [11, 21, 30]])
+    assert geometry.parts[0].material.diffuse == pytest.approx((0.2, 0.4, 0.6))
+    assert (geometry.unit_m, geometry.up) == (0.001, "z")
 
 
 def gltf(**more: Any) -> dict[str, Any]:
@@ -222,27 +222,27 @@ def gltf(**more: Any) -> dict[str, Any]:
 
 
 def test_gltf_is_placed_by_its_nodes_with_its_vertices_colours_and_textures_name(tmp_path: Path) -> None:
-    mesh = read(tmp_path, "a.gltf", json.dumps(gltf()))
-    np.testing.assert_allclose(bounds(mesh), [[0, 0, 2], [2, 2, 2]])
-    (part,) = mesh.parts
+    geometry = read(tmp_path, "a.gltf", json.dumps(gltf()))
+    np.testing.assert_allclose(bounds(geometry), [[0, 0, 2], [2, 2, 2]])
+    (part,) = geometry.parts
     assert part.two_sided
     assert part.material.texture == "wood.png"
     assert part.colors is not None
     green = part.colors[np.argmax(part.colors[:, 1])]
     assert green == pytest.approx([0, 0.5, 0, 1], abs=0.01)  # 0.214 of linear light
-    assert (mesh.unit_m, mesh.up) == (1.0, "y")
+    assert (geometry.unit_m, geometry.up) == (1.0, "y")
 
 
 def test_gltf_reads_its_buffer_from_its_folder_or_names_the_missing_file(tmp_path: Path) -> None:
     document = gltf()
     data = base64.b64decode(document["buffers"][0]["uri"].split(",")[1])
     document["buffers"][0]["uri"] = "a.bin"
-    with pytest.raises(MeshError, match=r"buffer 'a\.bin': no such file in this folder"):
+    with pytest.raises(ShapeError, match=r"buffer 'a\.bin': no such file in this folder"):
         read(tmp_path, "a.gltf", json.dumps(document))
     (tmp_path / "a.bin").write_bytes(data)
-    mesh = read(tmp_path, "a.gltf", json.dumps(document))
-    assert mesh.triangle_count == 1
-    assert mesh.files == (tmp_path / "a.bin", tmp_path / "wood.png")
+    geometry = read(tmp_path, "a.gltf", json.dumps(document))
+    assert geometry.triangle_count == 1
+    assert geometry.files == (tmp_path / "a.bin", tmp_path / "wood.png")
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_gltf_reads_its_buffer_from_its_folder_or_names_the_missing_file(tmp_pat
 def test_error_of_an_invalid_file_is_one_line(
     tmp_path: Path, name: str, content: str | bytes, expected: str
 ) -> None:
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(ShapeError) as caught:
         read(tmp_path, name, content)
     assert expected in str(caught.value)
     assert str(caught.value).startswith(str(tmp_path / name))
@@ -305,6 +305,6 @@ def test_error_of_an_invalid_file_is_one_line(
     ],
 )
 def test_wrong_extension_causes_a_warning(tmp_path: Path, name: str, content: str, expected: str) -> None:
-    mesh = read(tmp_path, name, content)
-    assert mesh.triangle_count > 0
-    assert mesh.warnings[0] == expected
+    geometry = read(tmp_path, name, content)
+    assert geometry.triangle_count > 0
+    assert geometry.warnings[0] == expected

@@ -1,12 +1,12 @@
-"""A run with some hundred poses; `python tests/fuzz/hulls_and_meshes.py` runs 10,000."""
+"""A run with some hundred poses; `python tests/fuzz/hulls_and_triangles.py` runs 10,000."""
 
 import pytest
 
-from tests.fuzz.hulls_and_meshes import compare
+from tests.fuzz.hulls_and_triangles import compare
 
 
 @pytest.mark.parametrize("robot", ["pt600", "puma560"])
-def test_hulls_miss_no_collision_that_meshes_show(robot: str) -> None:
+def test_hulls_miss_no_collision_that_shapes_show(robot: str) -> None:
     count = compare(robot, 150, seed=5)
     assert count.missed == []
     # Poses of which none collides, or all do, would have shown nothing.

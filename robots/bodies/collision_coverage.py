@@ -16,7 +16,7 @@ _STANDS_OUT_M = 0.005
 _DIRECTIONS = 400
 
 
-def collision_report(model: str) -> dict[str, Any]:
+def collision_coverage(model: str) -> dict[str, Any]:
     """Return the unchecked link pairs of an arm, and gaps in its collision geometry.
 
     Args:
@@ -29,7 +29,7 @@ def collision_report(model: str) -> dict[str, Any]:
         hull of its collision geometry, if over 5 mm.
 
     Raises:
-        MeshError: If a mesh cannot be read.
+        ShapeError: If a shape cannot be read.
     """
     plan = plan_pairs(model, False, wait=True)
     links = [link for link in tree_of(load(model)).links if link.shapes and link.collision]

@@ -1,4 +1,4 @@
-"""Generator of the library's mesh files: `python -m robots.library.build_meshes`.
+"""Generator of the library's shape files: `python -m robots.library.build_shapes`.
 
 The files are committed. To change them, change this script and run it.
 """
@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from robots.library import pt_arm, puma_arm
-from robots.library.parts import Piece, mesh_of
+from robots.library.parts import Piece, geometry_of
 from robots.shapes.files.three_ds.write import write_3ds
 from robots.shapes.files.vrml.write import write_vrml
 
@@ -41,19 +41,19 @@ ROBOTS: Mapping[str, Mapping[str, Callable[[], list[Piece]]]] = {
 }
 
 
-def mesh_file(robot: str, name: str) -> bytes:
-    """Return the content of one of the library's mesh files."""
-    mesh = mesh_of(ROBOTS[robot][name]())
-    return write_vrml(mesh).encode() if name.endswith(".wrl") else write_3ds(mesh)
+def shape_file(robot: str, name: str) -> bytes:
+    """Return the content of one of the library's shape files."""
+    geometry = geometry_of(ROBOTS[robot][name]())
+    return write_vrml(geometry).encode() if name.endswith(".wrl") else write_3ds(geometry)
 
 
 def main() -> None:
-    """Write every mesh file of the library."""
+    """Write every shape file of the library."""
     for robot, files in ROBOTS.items():
         folder = LIBRARY / robot / "meshes"
         folder.mkdir(exist_ok=True)
         for name in files:
-            (folder / name).write_bytes(mesh_file(robot, name))
+            (folder / name).write_bytes(shape_file(robot, name))
             print(f"{robot}/meshes/{name}")
 
 

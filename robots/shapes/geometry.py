@@ -1,4 +1,4 @@
-"""Content of a mesh file in any format: triangles, lines and points with materials.
+"""Content of a shape file in any format: triangles, lines and points with materials.
 
 Coordinates are in the file's units and axes.
 """
@@ -93,13 +93,13 @@ class Node:
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
-    """The whole content of a mesh file.
+class Geometry:
+    """The whole content of a shape file.
 
     Attributes:
         wires: Lines and points; triangle counts and bounds do not include them.
         warnings: Irregularities that the reader could handle, a sentence each.
-        missing: Names, as in the file, of other files that do not exist; the mesh is drawn without them.
+        missing: Names, as in the file, of other files that do not exist; the shape is drawn without them.
         files: Other files that the reader looked for, existing or not: the content depends on them.
         nodes: Hierarchy, if the format has one that adds to the parts (3DS).
         unit_m: Length of the unit [m] that the file or its format states; None if neither does.
@@ -138,9 +138,9 @@ def welded(vertices: FloatArray, triangles: IndexArray) -> tuple[FloatArray, Ind
     return positions[kept], number.reshape(-1)[triangles].astype(np.int64)
 
 
-def bounds(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper corner, (3,) each, of the vertices in triangles; zeros for an empty mesh."""
-    used = [part.vertices[np.unique(part.triangles)] for part in mesh.parts if len(part.triangles)]
+def bounds(geometry: Geometry) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper corner, (3,) each, of the vertices in triangles; zeros if there are none."""
+    used = [part.vertices[np.unique(part.triangles)] for part in geometry.parts if len(part.triangles)]
     if not used:
         return np.zeros(3), np.zeros(3)
     vertices = np.concatenate(used)
@@ -166,13 +166,13 @@ def transformed(part: Part, placement: FloatArray) -> Part:
     )
 
 
-def transformed_mesh(mesh: Mesh, placement: FloatArray) -> Mesh:
-    """Return a mesh with its wires and nodes moved by a (4, 4) affine transform."""
+def transformed_geometry(geometry: Geometry, placement: FloatArray) -> Geometry:
+    """Return a shape with its wires and nodes moved by a (4, 4) affine transform."""
     return replace(
-        mesh,
-        parts=tuple(transformed(part, placement) for part in mesh.parts),
-        wires=tuple(placed(wire, placement) for wire in mesh.wires),
-        nodes=tuple(replace(node, node_to_file=placement @ node.node_to_file) for node in mesh.nodes),
+        geometry,
+        parts=tuple(transformed(part, placement) for part in geometry.parts),
+        wires=tuple(placed(wire, placement) for wire in geometry.wires),
+        nodes=tuple(replace(node, node_to_file=placement @ node.node_to_file) for node in geometry.nodes),
     )
 
 

@@ -6,8 +6,8 @@ from starlette.requests import Request
 from robomesh import reason_codes as codes
 from robomesh.contract.keys import PresenceKey
 from robomesh.errors import BusyError, NoAnswerError, QuotaError, RefusedError
-from services.console.http import meshes
-from services.console.http.meshes import MeshCache, mesh_response
+from services.console.http import shapes
+from services.console.http.shapes import ShapeCache, shape_response
 from tests.conftest import run
 from tests.services.http_refusals import read_refusal
 
@@ -34,11 +34,11 @@ class Owner:
         (RefusedError("no mesh 'base' here"), 404, None),
     ],
 )
-def test_a_busy_service_is_retried_and_a_missing_mesh_is_not(monkeypatch, error, status, again):
-    monkeypatch.setattr(meshes, "_TIMEOUTS_S", (0.1, 0.1))
+def test_a_busy_service_is_retried_and_a_missing_shape_is_not(monkeypatch, error, status, again):
+    monkeypatch.setattr(shapes, "_TIMEOUTS_S", (0.1, 0.1))
     path = {"site": "s", "robot": "r", "name": "base"}
     request = Request({"type": "http", "query_string": b"", "headers": [], "path_params": path})
-    answer = run(mesh_response(request, Owner(error), MeshCache()))
+    answer = run(shape_response(request, Owner(error), ShapeCache()))
     assert (answer.status_code, answer.headers.get("retry-after")) == (status, again)
     assert answer.body.decode() == str(error)
     code = "request.no_answer" if status == 504 else "other"

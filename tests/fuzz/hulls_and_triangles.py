@@ -1,6 +1,6 @@
 """Hulls against meshes: does a hull miss a collision that the meshes show?
 
-    python tests/fuzz/hulls_and_meshes.py [--poses N] [--seed N] [--robots pt600,puma560,ur5]
+    python tests/fuzz/hulls_and_triangles.py [--poses N] [--seed N] [--robots pt600,puma560,ur5]
 
 Random positions within limits and constraints, of each arm without and with fixtures. A pair of links, or a
 link and a fixture, whose meshes touch and whose hulls do not ends the run with exit status 1.
@@ -17,7 +17,7 @@ from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.joints import FloatArray
 from robots.kinematics.kinematic_tree import Shape
 from robots.kinematics.views import reach
-from robots.shapes.mesh import Material, Mesh, Part
+from robots.shapes.geometry import Geometry, Material, Part
 from robots.shapes.solids import ball, box
 
 Pairs = set[tuple[str, str]]
@@ -70,10 +70,10 @@ def around(far: float) -> tuple[Fixture, ...]:
 
 def _fixture(name: str, solid: tuple[FloatArray, np.ndarray], at: FloatArray | None = None) -> Fixture:
     points, triangles = solid
-    mesh = Mesh(parts=(Part("", Material(), points, np.zeros_like(points), triangles),))
+    geometry = Geometry(parts=(Part("", Material(), points, np.zeros_like(points), triangles),))
     placement = np.eye(4)
     placement[:3, 3] = 0.0 if at is None else at
-    return Fixture(name, (Shape(mesh, np.eye(4)),), placement)
+    return Fixture(name, (Shape(geometry, np.eye(4)),), placement)
 
 
 def touches(cell: Cell, positions: FloatArray) -> Pairs:
@@ -95,10 +95,10 @@ def main() -> int:
     for robot in given.robots.split(","):
         count = compare(robot, given.poses, given.seed)
         missed += len(count.missed)
-        by_mesh, by_hull = count.colliding
+        by_triangles, by_hull = count.colliding
         print(
-            f"{robot}: {count.poses} poses, {by_mesh} collide as meshes, {by_hull} as hulls "
-            f"({(by_hull - by_mesh) / count.poses:.2%} more); {count.meshes} pairs touch as meshes, "
+            f"{robot}: {count.poses} poses, {by_triangles} collide as meshes, {by_hull} as hulls "
+            f"({(by_hull - by_triangles) / count.poses:.2%} more); {count.meshes} pairs touch as meshes, "
             f"{count.hulls} as hulls; missed by hulls: {len(count.missed)}",
             flush=True,
         )
