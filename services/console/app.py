@@ -7,9 +7,9 @@ import logging
 import ssl
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic import InstanceOf
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
@@ -58,6 +58,7 @@ from services.console.serving.uvicorn_server import (
 from services.console.websocket.page_connection import Browser
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from services.console.websocket.websocket_transport import transport_of
+from services.site_file.tables.console import Console
 
 log = logging.getLogger(__name__)
 
@@ -66,33 +67,18 @@ PAGE = Path(__file__).parent / "page"  # built from `web/`
 _CONNECTION_CHECK_EVERY_S = 0.5
 
 
-@dataclass(frozen=True, kw_only=True)
-class Settings:
+class Settings(Console):
     """Address, security and content of the console.
 
     Attributes:
         site: The console's own site; the page shows every site that its router reaches.
-        listen: `HOST:PORT`; port 0 takes a free port.
-        insecure: Accept other machines without TLS or accounts, at the site's own risk.
-        accounts: File of accounts for sign-in; None: every client may use the page, under the console's own
-            name if the console has a certificate.
-        certificate: With `key`: serve over TLS (PEM).
-        hosts: Host names of the console, in addition to `localhost` and IP addresses.
-        embed: Origins whose pages may show pictures and video.
         page: Folder of the built page.
         define: Settings of the page's Define; None: robots cannot be defined here.
     """
 
     site: str
-    listen: str = "127.0.0.1:8080"
-    insecure: bool = False
-    hosts: tuple[str, ...] = ()
-    embed: tuple[str, ...] = ()
-    accounts: Path | None = None
-    certificate: Path | None = None
-    key: Path | None = None
     page: Path = PAGE
-    define: DefineSettings | None = None
+    define: InstanceOf[DefineSettings] | None = None
 
 
 async def serve(
@@ -114,9 +100,7 @@ async def serve(
     warning = reach_warning(settings, host)
     if warning is not None:
         log.warning("%s", warning)
-    tls = None
-    if settings.certificate is not None and settings.key is not None:
-        tls = tls_context(settings.certificate, settings.key)
+    tls = None if settings.tls is None else tls_context(settings.tls.certificate, settings.tls.key)
     with listening(host, port) as listener:
         hub = Hub(session, settings, exposed=warning is not None, tls=tls)
         guarded = Guard(application(hub), settings.hosts, secure=tls is not None, embed=settings.embed)
@@ -135,7 +119,7 @@ def reach_warning(settings: Settings, host: str) -> str | None:
     return check_page_reach(
         host,
         accounts=settings.accounts is not None,
-        tls=settings.certificate is not None,
+        tls=settings.tls is not None,
         insecure=settings.insecure,
     )
 
@@ -179,9 +163,10 @@ class Hub:
         self._tasks = [asyncio.create_task(each) for each in work]
         if self.auth is not None:
             self._tasks.append(asyncio.create_task(self.auth.follow()))
-        certificate, key = self.settings.certificate, self.settings.key
-        if self._tls is not None and certificate is not None and key is not None:
-            self._tasks.append(asyncio.create_task(follow_certificate(self._tls, certificate, key)))
+        files = self.settings.tls
+        if self._tls is not None and files is not None:
+            follow = follow_certificate(self._tls, files.certificate, files.key)
+            self._tasks.append(asyncio.create_task(follow))
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -323,7 +308,7 @@ def application(hub: Hub) -> ASGIApp:
     `/mesh` and `/mesh/stop` (WebSockets), `/mesh/<site>/<robot>/<name>`, layouts of other viewers, pictures,
     pages of single views, recordings, Define, `/account`, `/health`, the page.
     """
-    settings, secure = hub.settings, hub.settings.certificate is not None
+    settings, secure = hub.settings, hub.settings.tls is not None
     cookie = cookie_name(settings.site, secure=secure)
     account = AccountRoutes(hub.auth, site=settings.site, cookie=cookie, secure=secure, insecure=hub.exposed)
 

@@ -19,7 +19,7 @@ from robomesh.reasons import Reason
 from robomesh.recordings import records
 from robomesh.recordings.writing.capture import Capture
 from robomesh.recordings.writing.recover import close_in_place
-from services.recorder.settings import MIB, Marks
+from services.recorder.settings import MIB, FreeSpace
 
 _WRITE_EVERY_S = 0.05
 _SYNC_EVERY_S = 1.0
@@ -72,11 +72,13 @@ class Disk:
         on_failed: Called, on another thread, with a file that could not be written.
     """
 
-    def __init__(self, folder: Path, marks: Marks, on_failed: Callable[[Capture, OSError], None]) -> None:
+    def __init__(
+        self, folder: Path, limits: FreeSpace, on_failed: Callable[[Capture, OSError], None]
+    ) -> None:
         self.folder = folder
         self.free_bytes = 0
         self.level = RecordingLevel.ALL
-        self._marks, self._on_failed = marks, on_failed
+        self._limits, self._on_failed = limits, on_failed
         self._level_by_space = RecordingLevel.ALL
         self._captures: tuple[Capture, ...] = ()
         # Guards the tuple of files; never held while waiting for the disk.
@@ -101,7 +103,7 @@ class Disk:
     @property
     def is_low(self) -> bool:
         """True if free space is below the warning mark."""
-        return self.free_bytes < self._marks.warn
+        return self.free_bytes < self._limits.warn_mib * MIB
 
     def update_level(self) -> RecordingLevel:
         """Set the recording level from the waiting bytes and the free space, and return it."""
@@ -152,7 +154,7 @@ class Disk:
         folder = next(each for each in (self.folder, *self.folder.absolute().parents) if each.exists())
         self.free_bytes = free = shutil.disk_usage(folder).free
         self._level_by_space = RecordingLevel(
-            (free < self._marks.no_video) + (free < self._marks.states_only)
+            (free < self._limits.video_mib * MIB) + (free < self._limits.states_mib * MIB)
         )
         reserve = self.folder / _RESERVE
         if free > 4 * _RESERVE_BYTES and self.folder.exists() and not reserve.exists():

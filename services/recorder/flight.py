@@ -26,7 +26,8 @@ from services.recorder.disk import error_text
 from services.recorder.file_writer import STATES, Part
 from services.recorder.finishing import Finisher, Job
 from services.recorder.reading.robot_series import FLIGHT_FOLDER
-from services.recorder.settings import MIB, Flight
+from services.recorder.settings import MIB
+from services.recorder.settings import FlightRecorder as Settings
 
 log = logging.getLogger(__name__)
 
@@ -80,12 +81,12 @@ class FlightRecorder:
         self,
         files: Files,
         finisher: Finisher,
-        flight: Flight,
+        settings: Settings,
         *,
         on_save: Callable[[Part], None],
         report: Callable[[schema.Event.Severity, str, str], None],
     ) -> None:
-        self._files, self._finisher, self._flight = files, finisher, flight
+        self._files, self._finisher, self._settings = files, finisher, settings
         self._folder = files.settings.folder / FLIGHT_FOLDER / files.robot
         self._target = files.settings.folder / files.robot
         self._loop = asyncio.get_running_loop()
@@ -129,7 +130,7 @@ class FlightRecorder:
                 self.saving = self._target_of(self._segments() or [self.part.capture.path], name)
                 log.info("%s: the last minutes are saved: %s", self._files.robot, cause)
                 self._on_save(self.part)
-            self._until, answer = now + self._flight.after_s, self.describe()
+            self._until, answer = now + self._settings.after_s, self.describe()
             assert self.saving is not None
             await asyncio.to_thread(_Save(self.saving, self._about).write_mark, self._folder)
             return answer
@@ -181,7 +182,7 @@ class FlightRecorder:
         if row.schema is schema.Event:
             with suppress(MessageError):
                 event = decode(schema.Event, payload)
-                if event.severity >= self._flight.severity and event.source != SOURCE:
+                if event.severity >= self._settings.least_severity and event.source != SOURCE:
                     self._loop.call_soon_threadsafe(self._on_event, event.text)
 
     def _on_event(self, text: str) -> None:
@@ -220,7 +221,7 @@ class FlightRecorder:
 
     def _is_full(self, part: Part) -> bool:
         most = self._files.settings.split.mib * MIB / _SEGMENTS
-        longest_s = max(self._flight.minutes * 60 / _SEGMENTS, _MIN_SEGMENT_S)
+        longest_s = max(self._settings.minutes * 60 / _SEGMENTS, _MIN_SEGMENT_S)
         return part.age_s >= longest_s or part.capture.size >= most or part.clock_was_set()
 
     def _is_too_long(self, now: float) -> bool:
@@ -240,7 +241,7 @@ class FlightRecorder:
         for segment in reversed(closed):
             with suppress(OSError):
                 room -= segment.stat().st_size
-                if now - self._closed_at[segment] > self._flight.minutes * 60 or room < 0:
+                if now - self._closed_at[segment] > self._settings.minutes * 60 or room < 0:
                     segment.unlink()
 
     def _target_of(self, segments: list[Path], name: str) -> Path:

@@ -67,7 +67,7 @@ class _Robot:
         self.recorder = recorder
         self.captures = RobotRecorder(files, recorder.finisher)
         self.flight: FlightRecorder | None = None
-        if settings.flight is not None:
+        if settings.flight.minutes:
             self.flight = FlightRecorder(
                 files,
                 recorder.finisher,
@@ -197,7 +197,7 @@ class _Recorder:
         self._group = asyncio.TaskGroup()
         self._robots: dict[str, _Robot] = {}
         self.subscriptions = Subscriptions(session.zenoh_session, settings.site, session.ignored)
-        self.disk = Disk(settings.folder, settings.marks, self._on_failed)
+        self.disk = Disk(settings.folder, settings.free, self._on_failed)
         self.finisher = Finisher()
         self.events = EventReporter(session, settings.site)
         self.descriptions = DescriptionCache(session, settings.site, self._on_known)
@@ -431,7 +431,7 @@ class _Recorder:
 
     def _flight_runs(self) -> bool:
         flights = [robot.flight for robot in self._robots.values() if robot.flight is not None]
-        return self.settings.flight is not None and not any(flight.stopped for flight in flights)
+        return self.settings.flight.minutes > 0 and not any(flight.stopped for flight in flights)
 
     def _open_now(self) -> dict[str, schema.Recording]:
         folder = self.settings.folder

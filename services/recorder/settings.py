@@ -1,89 +1,97 @@
-"""Settings of the recorder service."""
+"""The site file's `[recorder]`, and the settings of the service, which add what it knows of the site."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
+from pydantic import BaseModel, Field
+
+from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.schemas.robomesh_pb2 import Event
 
 MIB = 1 << 20
 
 
-@dataclass(frozen=True, kw_only=True)
-class Flight:
-    """Settings of the flight recorder.
+class FlightRecorder(BaseModel):
+    """The last minutes of every robot, saved after an event.
 
     Attributes:
-        minutes: Length of the ring.
-        severity: Lowest severity of an event that causes a save.
-        after_s: Time that a save continues after its last cause.
+        minutes: Time that is kept [min]; 0: no flight recorder.
+        severity: Least severity of an event that saves it.
+        after_s: Time after the event that is added [s].
     """
 
-    minutes: float = 5.0
-    severity: Event.Severity = Event.Severity.ERROR
-    after_s: float = 30.0
+    model_config = PART_CONFIG
+    minutes: Annotated[float, Field(ge=0, le=120)] = 5
+    severity: Literal["warning", "error", "critical"] = "error"
+    after_s: Annotated[float, Field(ge=0, le=600)] = 30
+
+    @property
+    def least_severity(self) -> Event.Severity:
+        """The severity as events have it."""
+        found: Event.Severity = getattr(Event.Severity, self.severity.upper())
+        return found
 
 
-@dataclass(frozen=True, kw_only=True)
-class Split:
-    """Size and length at which a capture continues in another file."""
-
-    mib: float = 1024.0
-    minutes: float = 60.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Marks:
-    """Thresholds of free space [bytes].
+class Split(BaseModel):
+    """Limits at which a recording continues in a new file.
 
     Attributes:
-        warn: Below it the recorder publishes a warning.
-        no_video: Below it video is not recorded.
-        states_only: Below it frames and kinematics are not recorded either.
+        mib: Size of a file [MiB].
+        minutes: Duration of a file [min].
     """
 
-    warn: int = 2048 * MIB
-    no_video: int = 512 * MIB
-    states_only: int = 64 * MIB
+    model_config = PART_CONFIG
+    mib: Annotated[float, Field(ge=1, le=65536)] = 1024
+    minutes: Annotated[float, Field(ge=0.1, le=1440)] = 60
 
 
-def flight_of(values: Mapping[str, Any]) -> Flight | None:
-    """Return the flight recorder of a site file's values, or None if it is switched off."""
-    if not values["minutes"]:
-        return None
-    severity: Event.Severity = getattr(Event.Severity, values["severity"].upper())
-    return Flight(minutes=values["minutes"], severity=severity, after_s=values["after_s"])
+class FreeSpace(BaseModel):
+    """Free space on the disk below which the recorder records less.
+
+    Attributes:
+        warn_mib: Below this the recorder publishes an event [MiB].
+        video_mib: Below this it records no video [MiB].
+        states_mib: Below this it records no values that can be computed from the joints again [MiB].
+    """
+
+    model_config = PART_CONFIG
+    warn_mib: Annotated[float, Field(ge=0)] = 2048
+    video_mib: Annotated[float, Field(ge=0)] = 512
+    states_mib: Annotated[float, Field(ge=0)] = 64
 
 
-def marks_of(values: Mapping[str, float]) -> Marks:
-    """Return the thresholds of a site file's values."""
-    return Marks(
-        warn=round(values["warn_mib"] * MIB),
-        no_video=round(values["video_mib"] * MIB),
-        states_only=round(values["states_mib"] * MIB),
-    )
+class Recorder(BaseModel):
+    """Recordings.
+
+    Attributes:
+        folder: Folder of the recordings.
+        views: Views recorded by default; each keeps the renderer busy during a recording. Absent: one view
+            that shows the whole arm.
+        flight: The flight recorder.
+        split: Size and duration of a file.
+        free: Limits of the free space.
+    """
+
+    model_config = PART_CONFIG
+    folder: Path = Path("recordings")
+    views: tuple[str, ...] | None = None
+    flight: FlightRecorder = FlightRecorder()
+    split: Split = Split()
+    free: FreeSpace = FreeSpace()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Settings:
+class Settings(Recorder):
     """Settings of a site's recorder.
 
     Attributes:
         robots: Robots that can be recorded from the start; others of the site once their gateway is online.
-        views: Views that a capture records as video, unless its request names others.
-        flight: Settings of the flight recorder, or None for no flight recorder.
+        views: As in the site file; absent: none.
         quotas: Quotas of each client that reads recordings.
         site_file: Text of the site file, attached to each recording; empty if there is none.
     """
 
     site: str
     robots: tuple[str, ...]
-    folder: Path
-    views: tuple[str, ...] = ("front",)
-    flight: Flight | None = None
-    split: Split = Split()
-    marks: Marks = Marks()
     quotas: Quotas = DEFAULT_QUOTAS
     site_file: str = ""

@@ -33,14 +33,17 @@ from robots.schema.bounded_toml import read_toml
 from robots.schema.errors import DescriptionError, VerificationRecordError
 from robots.schema.robot_toml import Pose, UrdfDescription
 from services.errors import SiteFileError
+from services.recorder.settings import Recorder
 from services.site_file.tables.console import Console
 from services.site_file.tables.console import resolve_paths as resolve_console_paths
 from services.site_file.tables.fixtures import Fixture, fixture_problem, name_problem
 from services.site_file.tables.quotas import Quotas
-from services.site_file.tables.renderer_and_recorder import ALWAYS_RENDERED, Recorder, Renderer
+from services.site_file.tables.renderer import ALWAYS_RENDERED, Renderer
 from services.site_file.tables.robot import Robot
 from services.site_file.tables.router import RoutedSite, resolve_paths
 from services.site_file.validation_errors import sentence
+from services.store.settings import Programs
+from services.watch.settings import Watch
 
 # Maximum number of problems that an error lists.
 _MAX_PROBLEMS = 100
@@ -68,34 +71,6 @@ class Audit(BaseModel):
     model_config = PART_CONFIG
     folder: Path = Path("audit")
     rotate_mib: Annotated[float, Field(ge=0.01, le=1024)] = 16
-
-
-class Watch(BaseModel):
-    """The service that raises alarms.
-
-    Attributes:
-        folder: Folder of its alarms, so that a restart keeps acknowledgements.
-    """
-
-    model_config = PART_CONFIG
-    folder: Path = Path("watch")
-
-
-class Programs(BaseModel):
-    """Programs and notes that the site stores.
-
-    Attributes:
-        folder: Folder of the programs and notes.
-        most_mib: Quota of all saved versions [MiB].
-        runs_mib: Space for programs that ran without being saved; the oldest make room [MiB].
-        notes_mib: Quota of all notes; none is ever removed [MiB].
-    """
-
-    model_config = PART_CONFIG
-    folder: Path = Path("programs")
-    most_mib: Annotated[float, Field(ge=1, le=4096)] = 64
-    runs_mib: Annotated[float, Field(ge=1, le=4096)] = 16
-    notes_mib: Annotated[float, Field(ge=1, le=256)] = 16
 
 
 class Site(RoutedSite):

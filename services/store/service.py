@@ -26,7 +26,7 @@ from services.errors import ServiceError
 from services.store.layouts import Layouts
 from services.store.notes import NoteBook
 from services.store.programs import ProgramStore
-from services.store.settings import Settings
+from services.store.settings import MIB, Settings
 
 log = logging.getLogger(__name__)
 
@@ -50,9 +50,12 @@ async def serve(session: Session, settings: Settings) -> None:
     """
     folder = settings.folder / check_name(settings.site, "site")
     folder.mkdir(parents=True, exist_ok=True)
-    store = ProgramStore(folder, most_bytes=settings.most_bytes, most_run_bytes=settings.most_run_bytes)
+    most, most_of_runs, most_of_notes = (
+        round(mib * MIB) for mib in (settings.most_mib, settings.runs_mib, settings.notes_mib)
+    )
+    store = ProgramStore(folder, most_bytes=most, most_run_bytes=most_of_runs)
     with await _locked(folder):
-        notes = NoteBook(folder, most_bytes=settings.most_note_bytes)
+        notes = NoteBook(folder, most_bytes=most_of_notes)
         await _Service(session, settings, store, notes, Layouts(folder)).run()
 
 

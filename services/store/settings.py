@@ -1,30 +1,41 @@
-"""Settings of the store service."""
+"""The site file's `[programs]`, and the settings of the service, which add what it knows of the site."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+from pydantic import BaseModel, Field
+
+from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 
 MIB = 1 << 20
 
 
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """A site's programs and notes.
+class Programs(BaseModel):
+    """Programs and notes that the site stores.
+
+    Attributes:
+        folder: Folder of the programs and notes.
+        most_mib: Quota of all saved versions [MiB].
+        runs_mib: Space for programs that ran without being saved; the oldest make room [MiB].
+        notes_mib: Quota of all notes; none is ever removed [MiB].
+    """
+
+    model_config = PART_CONFIG
+    folder: Path = Path("programs")
+    most_mib: Annotated[float, Field(ge=1, le=4096)] = 64
+    runs_mib: Annotated[float, Field(ge=1, le=4096)] = 16
+    notes_mib: Annotated[float, Field(ge=1, le=256)] = 16
+
+
+class Settings(Programs):
+    """A site's programs and notes; each site has a folder in `folder`.
 
     Attributes:
         robots: The site file's robots; a robot that is started from the page is found by its gateway.
-        folder: Folder of the programs and notes; each site has a folder in it.
-        most_bytes: Quota of all saved versions [bytes].
-        most_run_bytes: Space for texts that ran without being saved; the oldest are removed [bytes].
-        most_note_bytes: Quota of all notes [bytes].
         quotas: Quotas of each client.
     """
 
     site: str
     robots: tuple[str, ...] = ()
-    folder: Path = Path("programs")
-    most_bytes: int = 64 * MIB
-    most_run_bytes: int = 16 * MIB
-    most_note_bytes: int = 16 * MIB
     quotas: Quotas = DEFAULT_QUOTAS

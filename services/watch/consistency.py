@@ -14,14 +14,13 @@ from robomesh.contract.messages import received_reason
 from robomesh.wire.session import CERTIFICATE
 from services.watch.conditions import Condition, condition_of
 from services.watch.mesh import Mesh, Process
+from services.watch.settings import SETTLED_S
 
 # One per robot or per site.
 _UNIQUE = ("gateway", "kinematics", "watch", "store")
 # Services that must run on every site. Others are optional; a missing simulated controller shows as a link
 # that is down.
 _REQUIRED = frozenset({*_UNIQUE, "router", "recorder", "player", "renderer", "console"})
-# A restart is over by then: the old token is gone and the new one is present.
-SETTLED_S = 6.0
 _CLOCK_S, _CLOCK_OVER_S = 0.5, 0.4
 _LOSS, _LOSS_OVER, _LOSS_LEAST = 5e-3, 1e-3, 20
 _SILENT_S = 10.0

@@ -5,8 +5,6 @@ import contextlib
 import logging
 import time
 from collections.abc import Coroutine, Iterable
-from dataclasses import dataclass
-from pathlib import Path
 
 from robomesh.contract.ignored import PUBLICATION
 from robomesh.contract.keys import ROOT, WHOLE_SITE, check_name, is_replay
@@ -22,8 +20,9 @@ from robomesh.wire.session import Session
 from services.watch.alarm_registry import AlarmRegistry
 from services.watch.alarms import AlarmError
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions
-from services.watch.consistency import SETTLED_S, Expected, largest_clock_offset_s, mesh_conditions
+from services.watch.consistency import Expected, largest_clock_offset_s, mesh_conditions
 from services.watch.mesh import Mesh
+from services.watch.settings import Settings
 
 log = logging.getLogger(__name__)
 
@@ -38,22 +37,6 @@ _KNOWN_AFTER_S = 2.0
 _NAMES_MOST = 200
 # Keys outside the contract: this many become events; the services' health counts all.
 _MOST_IGNORED, _LONGEST_IGNORED = 64, 200
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """A site's watch.
-
-    Attributes:
-        folder: Folder of the alarms' file.
-        expected: Services that should run, with their robots (`-`: the whole site), beside those seen.
-        settled_s: Minimum time for which a service is missing or duplicate before an alarm begins [s].
-    """
-
-    site: str
-    folder: Path = Path("watch")
-    expected: tuple[tuple[str, str], ...] = ()
-    settled_s: float = SETTLED_S
 
 
 async def serve(session: Session, settings: Settings) -> None:

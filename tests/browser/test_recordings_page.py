@@ -12,7 +12,9 @@ from playwright.sync_api import expect
 from robomesh.contract.keys import WHOLE_SITE
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from services import player, recorder, store
+from services import player
+from services.recorder import recorder
+from services.store import service as store
 from tests.browser.robot_page import (
     button,
     events,
@@ -47,7 +49,10 @@ def recorded(plant, tmp_path_factory):
         for name in ("recorder", "player"):
             own.declare_presence("hall", WHOLE_SITE, name)
         serving = (
-            recorder.serve(own, recorder.Settings(site="hall", robots=("pt600",), folder=folder, views=())),
+            recorder.serve(
+                own,
+                recorder.Settings(site="hall", robots=("pt600",), folder=folder, views=()),
+            ),
             player.serve(own, player.Settings(site="hall", folder=folder)),
         )
         tasks = [plant.loop.create_task(each) for each in serving]

@@ -40,7 +40,7 @@ def accounts(tmp_path_factory):
 def plant(accounts, tmp_path_factory):
     """Run a site whose console has accounts and TLS."""
     certificate, key = self_signed(tmp_path_factory.mktemp("tls"))
-    settings = {"accounts": accounts, "certificate": certificate, "key": key}
+    settings = {"accounts": accounts, "tls": {"certificate": certificate, "key": key}}
     yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), robots=("arm",), console=settings))
 
 

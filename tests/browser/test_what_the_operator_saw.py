@@ -11,7 +11,7 @@ import pytest
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from playwright.sync_api import expect
 
-from services import recorder
+from services.recorder import recorder
 from tests.browser.robot_page import (
     ARM,
     button,

@@ -8,8 +8,8 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from services import recorder
-from services.recorder.settings import Settings
+from services.recorder import recorder
+from services.recorder.settings import FlightRecorder, Settings
 
 Ask = schema.RecorderRequest
 KEY = "robomesh/site/arm/recorder/request"
@@ -21,7 +21,12 @@ WITHIN_S = 20.0
 async def recording_site(mesh, folder, **settings):
     """Run a recorder; yield a session that publishes for robot `arm`."""
     async with open_session(mesh) as service, open_session(mesh) as gateway:
-        settings = Settings(site="site", robots=("arm",), folder=folder, **settings)
+        settings = Settings(
+            **{"flight": FlightRecorder(minutes=0), "views": ("front",)} | settings,
+            site="site",
+            robots=("arm",),
+            folder=folder,
+        )
         task = asyncio.create_task(recorder.serve(service, settings))
         try:
             yield gateway

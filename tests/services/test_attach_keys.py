@@ -13,8 +13,8 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import MONITOR
 from robomesh.wire.session import SessionSettings, open_session
 from services.pki import Folder, authority
-from services.ros2 import Settings as Ros2Settings
-from services.ros2 import serve as serve_ros2
+from services.ros2.service import serve as serve_ros2
+from services.ros2.settings import Settings as Ros2Settings
 from services.router.router import read_access
 from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import until

@@ -16,7 +16,12 @@ from tests.site import robomesh
 @contextlib.asynccontextmanager
 async def recorder(mesh, folder):
     async with open_session(mesh) as session:
-        task = asyncio.create_task(serve(session, Settings(site="hall", robots=("arm",), folder=folder)))
+        task = asyncio.create_task(
+            serve(
+                session,
+                Settings(site="hall", robots=("arm",), folder=folder),
+            )
+        )
         try:
             yield
         finally:
@@ -40,7 +45,7 @@ def test_a_log_that_was_cut_shows_against_a_recording_of_its_time(mesh, tmp_path
             await until(lambda: plant.controller.audit_head.number >= 3)
             await plant.lease(A.RENEW, ttl_s=5)
             await plant.command(C.TRACE_OFF)
-            (file,) = folder.rglob("*.mcap")
+            (file,) = folder.glob("arm/*.mcap")
             await until(
                 lambda: describe_file(file).audit_head.number >= 3 and not describe_file(file).problem
             )

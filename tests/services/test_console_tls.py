@@ -28,7 +28,7 @@ def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tl
 
     async def main():
         path = accounts_file(tmp_path)
-        settings = {"accounts": path, "certificate": certificate, "key": key}
+        settings = {"accounts": path, "tls": {"certificate": certificate, "key": key}}
         async with console(mesh, page, **settings) as (address, _):
             here = address.removeprefix("https://")
             trusted = ssl.create_default_context(cafile=certificate)
@@ -64,7 +64,7 @@ def test_beyond_loopback_it_needs_accounts_and_tls(mesh, page, tmp_path, has, la
     if "accounts" in has:
         settings["accounts"] = accounts_file(tmp_path)
     if "tls" in has:
-        settings |= {"certificate": certificate, "key": key}
+        settings |= {"tls": {"certificate": certificate, "key": key}}
 
     async def main():
         with pytest.raises(ListenError, match=f"without {lacks}: give it accounts"):
@@ -88,7 +88,7 @@ def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_n
     anyone.check_hostname, anyone.verify_mode = False, ssl.CERT_NONE
 
     async def main():
-        async with console(mesh, page, certificate=certificate, key=key) as (address, _):
+        async with console(mesh, page, tls={"certificate": certificate, "key": key}) as (address, _):
 
             async def shown():
                 async with connected(address.removeprefix("https://"), ssl=anyone) as (_, writer):
@@ -112,7 +112,7 @@ def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, t
     trusted = ssl.create_default_context(cafile=certificate)
 
     async def main():
-        async with console(mesh, page, certificate=certificate, key=key) as (address, _):
+        async with console(mesh, page, tls={"certificate": certificate, "key": key}) as (address, _):
             here = address.removeprefix("https://")
             headers = [("Origin", address), ("Connection", "Upgrade"), ("Upgrade", "websocket")]
             headers += [("Sec-WebSocket-Version", 13), ("Sec-WebSocket-Key", "AAAAAAAAAAAAAAAAAAAAAA==")]
@@ -142,7 +142,7 @@ def test_an_invalid_certificate_is_named(mesh, page, tmp_path):
             (tmp_path / "d.pem", "No such file"),
         ):
             with pytest.raises(ListenError, match=why) as refused:
-                async with console(mesh, page, certificate=certificate, key=certificate):
+                async with console(mesh, page, tls={"certificate": certificate, "key": certificate}):
                     pass
             assert certificate.name in str(refused.value)
 

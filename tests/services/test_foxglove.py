@@ -16,7 +16,8 @@ from renderer.encoding.encoder import H264Encoder
 from robomesh.contract.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
-from services.foxglove import Settings, serve
+from services.foxglove.server import serve
+from services.foxglove.settings import Settings
 from tests.conftest import free_port, run
 from tests.protocol_gateway.gateway_site import STATE, gateway, simulator
 from tests.services.foxglove_client import attached

@@ -25,12 +25,15 @@ from robomesh.errors import KeyNameError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.health import Served, present
 from robomesh.wire.session import SessionSettings, open_session
-from services import foxglove, kinematics, player, recorder, ros2, watch
+from services import kinematics, player
 from services.command_line.watch.listing import _Clocks, _collect
 from services.console import app
+from services.foxglove import server as foxglove
 from services.pki import Folder, authority
-from services.recorder.settings import Settings as RecorderSettings
+from services.recorder import recorder
+from services.ros2 import service as ros2
 from services.router.router import read_access
+from services.watch import watch
 from tests.cells import single_arm
 from tests.conftest import free_port
 from tests.renderer.bodies import context_or_skip
@@ -95,7 +98,10 @@ def site_settings(folder: Path) -> dict:
             kinematics.serve,
             kinematics.Settings(site=SITE, robots=(single_arm(simulated=True),)),
         ),
-        "recorder": (recorder.serve, RecorderSettings(site=SITE, robots=("arm",), folder=folder / "mcap")),
+        "recorder": (
+            recorder.serve,
+            recorder.Settings(site=SITE, robots=("arm",), folder=folder / "mcap"),
+        ),
         "player": (player.serve, player.Settings(site=SITE, folder=folder / "mcap")),
         "watch": (watch.serve, watch.Settings(site=SITE, folder=folder / "watch")),
         "renderer": (

@@ -15,8 +15,9 @@ from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from services import player, recorder
+from services import player
 from services.command_line.watch import listing, monitor
+from services.recorder import recorder
 from tests.conftest import last_value, run
 from tests.recordings import START_NS, Written, joints, write_recording
 from tests.refusals import refused
@@ -343,11 +344,11 @@ def test_the_terminal_monitor_marks_a_replay(mesh, router, folder, capsys):
     async def main():
         async with playing_site(mesh, folder) as session:
             state = await opened(session, position_s=1.0, loop=True)
-            await asyncio.to_thread(monitor.run, state.robot, router, True, 2)
+            await asyncio.to_thread(monitor.monitor, state.robot, router, True, 2)
             line = json.loads(capsys.readouterr().out.splitlines()[-1])
             await monitor._live(state.robot, router, 2)
             screen = capsys.readouterr().out
-            await asyncio.to_thread(listing.run, router, False)
+            await asyncio.to_thread(listing.list_, router, False)
             assert f"site/{state.robot}   replay of site/arm, " in capsys.readouterr().out
             return line, screen
 

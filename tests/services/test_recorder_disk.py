@@ -10,7 +10,7 @@ from robomesh.contract.topics import topic
 from robomesh.recordings.writing.capture import Capture
 from robomesh.recordings.writing.recover import State, state_of
 from services.recorder.disk import Disk
-from services.recorder.settings import Marks
+from services.recorder.settings import FreeSpace
 
 KEY = "robomesh/site/arm/joints"
 FULL = OSError(errno.ENOSPC, "No space left on device")
@@ -24,7 +24,8 @@ def failed():
 
 @pytest.fixture
 def disk(tmp_path, failed):
-    disk = Disk(tmp_path, Marks(warn=0, no_video=0, states_only=0), lambda capture, _: failed.append(capture))
+    no_limits = FreeSpace(warn_mib=0, video_mib=0, states_mib=0)
+    disk = Disk(tmp_path, no_limits, lambda capture, _: failed.append(capture))
     yield disk
     disk.end()
 

@@ -14,7 +14,7 @@ from robomesh.errors import RefusedError
 from robomesh.recordings.files import describe_file
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings
-from services.recorder.settings import Marks, Split
+from services.recorder.settings import FreeSpace, Split
 from tests.conftest import free_port, run
 from tests.refusals import refused
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
@@ -60,7 +60,7 @@ def test_the_recording_topic_counts_recorded_and_lost_messages_live(mesh, tmp_pa
 
 def test_a_capture_continues_in_numbered_files_that_begin_with_a_key_frame(mesh, tmp_path):
     async def main():
-        split = Split(minutes=0.01)
+        split = Split.model_construct(minutes=0.01)
         async with recording_site(mesh, tmp_path, split=split, views=("front",)) as session:
             joints, video = (
                 session.declare_publisher("site", "arm", name) for name in ("joints", "video/front")
@@ -142,8 +142,8 @@ async def pictures(video):
 
 def test_below_the_mark_video_is_dropped_counted_and_reported(mesh, tmp_path):
     async def main():
-        marks = Marks(warn=0, no_video=1 << 62, states_only=0)
-        async with recording_site(mesh, tmp_path, marks=marks, views=("front",)) as session:
+        free = FreeSpace(warn_mib=0, video_mib=1 << 42, states_mib=0)
+        async with recording_site(mesh, tmp_path, free=free, views=("front",)) as session:
             joints, video = (
                 session.declare_publisher("site", "arm", name) for name in ("joints", "video/front")
             )

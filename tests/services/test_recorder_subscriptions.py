@@ -16,7 +16,7 @@ from robomesh.wire.session import open_session
 from services.recorder import subscriptions
 from services.recorder.disk import RecordingLevel
 from services.recorder.file_writer import Part
-from services.recorder.settings import Flight
+from services.recorder.settings import FlightRecorder
 from services.recorder.subscriptions import interval_s
 from tests.conftest import run
 from tests.recordings import KEY_PICTURE, PICTURE, START_NS
@@ -89,7 +89,7 @@ def test_a_sink_receives_and_counts_as_lost_only_its_own_topics(mesh):
 
 def test_a_recording_continues_after_invalid_messages(mesh, tmp_path):
     async def main():
-        async with recording_site(mesh, tmp_path, flight=Flight(minutes=1.0)) as session:
+        async with recording_site(mesh, tmp_path, flight=FlightRecorder(minutes=1.0)) as session:
             joints = session.declare_publisher("site", "arm", "joints")
             await until(lambda: joints.watched)
             put = session.zenoh_session.put

@@ -15,8 +15,9 @@ from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from services.ros2 import Settings, serve
 from services.ros2.bridge import JOINT_STATES, ROBOT_DESCRIPTION, TF
+from services.ros2.service import serve
+from services.ros2.settings import Settings
 from services.ros2.wire import Topic
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until

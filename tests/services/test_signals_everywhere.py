@@ -15,8 +15,8 @@ from robomesh.recordings.series.downsampling import SeriesReader, known_values
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.metrics import SessionMetrics
 from robomesh.wire.session import open_session
-from services import recorder
 from services.command_line.main import run as robomesh_run
+from services.recorder import recorder
 from services.recorder.reading.answers import Answers
 from services.recorder.settings import Settings
 from tests.conftest import run

@@ -13,9 +13,8 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.health import Served, present
 from robomesh.wire.session import open_session
 from services.command_line.main import run as robomesh
-from services.store import Settings, serve
 from services.store.history import sha256
-from services.store.service import FolderInUseError
+from services.store.service import FolderInUseError, Settings, serve
 from tests.conftest import run
 from tests.refusals import refused
 from tests.services.test_stored_programs import run_of

@@ -14,7 +14,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.clock import answer_clock
 from robomesh.service.health import Served, present
 from robomesh.wire.session import SessionSettings, open_session
-from services.watch import Settings, serve
+from services.watch.watch import Settings, serve
 from tests.conftest import free_port, run
 from tests.refusals import refused
 

@@ -35,7 +35,7 @@ class Service:
     """A service that runs from a site file.
 
     Attributes:
-        module: Has the service's `Settings` and `serve`.
+        module: Has the service's `serve`.
         settings: Makes the Settings; None: `site/router.py` does, which reads a part of the site file.
         of_robots: It declares presence for each robot, and a site without robots does not run it.
         required: `robomesh up` ends if it cannot start as it is configured.
@@ -130,34 +130,21 @@ def _console(site: "Site", options: Options) -> Any:
     from services.console.app import Settings
     from services.console.define.settings import DefineSettings
 
-    tls = site.console.tls
-    return Settings(
-        site=site.site,
-        listen=site.console.listen,
-        insecure=site.console.insecure,
-        hosts=site.console.hosts,
-        embed=site.console.embed,
-        accounts=site.console.accounts,
-        certificate=None if tls is None else tls.certificate,
-        key=None if tls is None else tls.key,
-        define=DefineSettings(site=site, can_start=options.supervised),
-    )
+    define = DefineSettings(site=site, can_start=options.supervised)
+    return Settings(**dict(site.console), site=site.site, define=define)
 
 
 def _recorder(site: "Site", options: Options) -> Any:
-    from services import recorder
+    from services.recorder.attachments import without_secrets
+    from services.recorder.settings import Settings
 
     file = options.site_file
-    return recorder.Settings(
+    return Settings(
+        **dict(site.recorder) | {"views": site.recorded_views},
         site=site.site,
         robots=tuple(robot.name for robot in site.robot),
-        folder=site.recorder.folder,
-        views=site.recorded_views,
-        flight=recorder.flight_of(site.recorder.flight.model_dump()),
-        split=recorder.Split(**site.recorder.split.model_dump()),
-        marks=recorder.marks_of(site.recorder.free.model_dump()),
         quotas=site.quotas.settings,
-        site_file="" if file is None else recorder.without_secrets(file.read_text(encoding="utf-8")),
+        site_file="" if file is None else without_secrets(file.read_text(encoding="utf-8")),
     )
 
 
@@ -168,30 +155,22 @@ def _player(site: "Site", _: Options) -> Any:
 
 
 def _watch(site: "Site", options: Options) -> Any:
-    from services.watch import Settings
+    from services.watch.settings import Settings
 
     robots = [robot.name for robot in site.robot]
     expected = [
         (name, each) for name, row in SERVICES.items() for each in (robots if row.of_robots else ["-"])
     ]
     return Settings(
-        site=site.site, folder=site.watch.folder, expected=tuple(expected) if options.supervised else ()
+        **dict(site.watch), site=site.site, expected=tuple(expected) if options.supervised else ()
     )
 
 
 def _store(site: "Site", _: Options) -> Any:
-    from services.store.settings import MIB, Settings
+    from services.store.settings import Settings
 
-    part = site.programs
-    return Settings(
-        site=site.site,
-        robots=tuple(robot.name for robot in site.robot),
-        folder=part.folder,
-        most_bytes=round(part.most_mib * MIB),
-        most_run_bytes=round(part.runs_mib * MIB),
-        most_note_bytes=round(part.notes_mib * MIB),
-        quotas=site.quotas.settings,
-    )
+    robots = tuple(robot.name for robot in site.robot)
+    return Settings(**dict(site.programs), site=site.site, robots=robots, quotas=site.quotas.settings)
 
 
 def _renderer(site: "Site", _: Options) -> Any:
@@ -232,7 +211,7 @@ SERVICES = {
         packages=("starlette", "uvicorn", "websockets"),
     ),
     "recorder": Service(
-        module="services.recorder",
+        module="services.recorder.recorder",
         settings=_recorder,
         required=False,
         finishes="closing its recordings",
@@ -244,7 +223,7 @@ SERVICES = {
         required=False,
         packages=("mcap", "mcap_protobuf"),
     ),
-    "watch": Service(module="services.watch", settings=_watch, required=False),
+    "watch": Service(module="services.watch.watch", settings=_watch, required=False),
     # Without OpenGL everything else runs.
     "renderer": Service(
         module="renderer.service",
@@ -253,7 +232,7 @@ SERVICES = {
         packages=("moderngl", "av", "cv2"),
     ),
     "store": Service(
-        module="services.store",
+        module="services.store.service",
         settings=_store,
         required=False,
         finishes="writing a program",

@@ -11,6 +11,8 @@ from robomesh.listen_address import check_reach, split_address
 from services.command_line.terminal.connection_options import attachment, own_identity
 from services.command_line.terminal.options import Connect, Metrics, command_group
 from services.command_line.terminal.output import print_line
+from services.foxglove.settings import Settings as Foxglove
+from services.ros2.settings import Settings as Ros2
 
 Robots = Annotated[
     list[str] | None,
@@ -23,7 +25,7 @@ app = command_group()
 
 @app.command()
 def foxglove(
-    listen: Annotated[str, typer.Option(metavar="HOST:PORT")] = "127.0.0.1:8765",
+    listen: Annotated[str, typer.Option(metavar="HOST:PORT")] = Foxglove.listen,
     robot: Robots = None,
     operator: Annotated[
         str, typer.Option(metavar="NAME", help="Offer commands, in this operator's name; else only stop.")
@@ -51,10 +53,10 @@ def foxglove(
         _write_layout(layout, robot or [], connect)
         return
     from robomesh.service import service
-    from services import foxglove as bridge
+    from services.foxglove.server import serve
 
     service.log_to_stderr()
-    settings = bridge.Settings(
+    settings = Foxglove(
         listen=listen,
         robots=tuple(robot or ()),
         site=_site(),
@@ -66,7 +68,7 @@ def foxglove(
         insecure=insecure,
     )
     service.run(
-        bridge.serve,
+        serve,
         settings,
         service="foxglove",
         session_settings=attachment(connect),
@@ -102,9 +104,9 @@ def _write_layout(path: Path, robots: list[str], router: str) -> None:
 
 @app.command()
 def ros2(
-    domain: Annotated[int, typer.Option(metavar="N", min=0, max=232, help="ROS_DOMAIN_ID.")] = 0,
+    domain: Annotated[int, typer.Option(metavar="N", min=0, max=232, help="ROS_DOMAIN_ID.")] = Ros2.domain,
     robot: Robots = None,
-    node: Annotated[str, typer.Option(metavar="NAME", help="Node name in the ROS graph.")] = "robomesh",
+    node: Annotated[str, typer.Option(metavar="NAME", help="Node name in the ROS graph.")] = Ros2.node,
     meshes: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Folder for the files that /robot_description names."),
@@ -117,16 +119,16 @@ def ros2(
     Topics: /joint_states, /tf, /robot_description.
     """
     from robomesh.service import service
-    from services import ros2 as bridge
+    from services.ros2.service import serve
 
     service.log_to_stderr()
-    settings = bridge.Settings(
+    settings = Ros2(
         domain=domain, robots=tuple(robot or ()), site=_site(), metrics=_metrics(metrics), node=node
     )
     if meshes is not None:
         settings = replace(settings, shapes=meshes)
     service.run(
-        bridge.serve,
+        serve,
         settings,
         service="ros2",
         session_settings=attachment(connect),
