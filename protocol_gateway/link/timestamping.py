@@ -11,9 +11,10 @@ the measured rate.
 
 A controller's clock may drift, or be set. The offset follows a drift slowly. If it cannot be followed (TIME
 goes back, a unit is early by more than 1 ms, all units stay late), a new clock number begins
-(`EventTime.clock`), and with it a new publisher identity. Within one number, stamps strictly increase and are
-spaced like TIME. Units that stay late for a second are taken as on time, so that no clock can make live data
-look old for longer.
+(`EventTime.clock`), and with it a new publisher identity. Stamps do not go back from one number to the next.
+Within one number they strictly increase and are spaced like TIME; only the units of its first read may be
+closer. Units that stay late for a second are taken as on time, so that no clock can make live data look old
+for longer.
 """
 
 from collections.abc import Iterator, Sequence
@@ -73,7 +74,9 @@ class Timestamper:
         self._gap_end_s = float("-inf")
         self._line = _Line()
         self._rate = _Rate()
+        # The newest stamp of this clock number, and of all numbers before.
         self._newest_ns: int | None = None
+        self._newest_before_ns: int | None = None
         # A moment without a new TIME has followed the newest TIME.
         self._behind = True
 
@@ -123,17 +126,22 @@ class Timestamper:
         This is a shortcut for controllers without TIME: the general way gives the same stamp.
         """
         timed = self._line.time_ns is not None or getattr(event, "controller_time_s", None) is not None
-        ordered = self._newest_ns is None or self._newest_ns < now_ns
+        newest_ns = self._newest_of_all_ns
+        ordered = newest_ns is None or newest_ns < now_ns
         if timed or not ordered or not self._behind or self._clock != now.clock:
             return False
         self._rate.period_ns(1, now_ns)
         self._newest_ns = now_ns
         return True
 
+    @property
+    def _newest_of_all_ns(self) -> int | None:
+        return self._newest_before_ns if self._newest_ns is None else self._newest_ns
+
     def _begin_clock(self) -> None:
         self._clock += 1
         self._line = _Line()
-        self._newest_ns = None
+        self._newest_before_ns, self._newest_ns = self._newest_of_all_ns, None
 
     def _stamps(self, times_ns: Sequence[int | None], now_ns: int) -> list[tuple[int, int]]:
         """Return stamps on the monotonic clock [ns] and clock numbers of the moments of one read."""
@@ -195,8 +203,18 @@ class Timestamper:
         return (now_ns - self._newest_ns) // moments
 
     def _in_order(self, stamps: list[int], now_ns: int) -> list[int]:
-        """Return stamps that strictly increase, after the newest one and not after their receipt."""
+        """Return stamps that strictly increase, after the newest one and not after their receipt.
+
+        The newest one may be of the clock number before: if a delayed unit began that number, the units that
+        show the delay, and begin the next number, are often dated before it.
+        """
         before_ns = self._newest_ns
+        if before_ns is None and self._newest_before_ns is not None:
+            # Both numbers may begin in this read; then there is no more room before the receipt.
+            before_ns = min(self._newest_before_ns, now_ns - len(stamps))
+        if self._newest_ns is None and before_ns is not None and stamps[0] <= before_ns < stamps[-1] - 1:
+            room_ns, wanted_ns = stamps[-1] - before_ns - 1, stamps[-1] - stamps[0]
+            stamps = [stamps[-1] - (stamps[-1] - each) * room_ns // wanted_ns for each in stamps]
         whole = stamps if before_ns is None else [before_ns, *stamps]
         if any(later <= earlier for earlier, later in pairwise(whole)) or stamps[-1] > now_ns:
             first_ns = stamps[0] - 1 if before_ns is None else before_ns

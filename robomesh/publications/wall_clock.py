@@ -10,15 +10,14 @@ import time
 # Smaller steps of the wall clock are ignored. The limit for steps back is lower, because they can change the
 # order of two close timestamps.
 _SET_FORWARD_NS, _SET_BACK_NS = 1_000_000, 1_000
-_FIRST_READINGS = 30
+_READINGS = 30
 
 
 class WallClock:
     """Wall clock times from monotonic times; for one thread at a time."""
 
     def __init__(self) -> None:
-        readings = [_bracket() for _ in range(_FIRST_READINGS)]
-        self._least_ns, self._most_ns = min(readings, key=lambda reading: reading[1] - reading[0])
+        self._least_ns, self._most_ns = _narrow_bracket()
 
     def was_set(self) -> bool:
         """Return whether the wall clock was set since the last call, at least 1 ms forward or 1 µs back."""
@@ -27,7 +26,8 @@ class WallClock:
             self._least_ns, self._most_ns = max(self._least_ns, least_ns), min(self._most_ns, most_ns)
             return False
         forward_ns, back_ns = least_ns - self._most_ns, self._least_ns - most_ns
-        self._least_ns, self._most_ns = least_ns, most_ns
+        # The bracket of a suspended reading is wide: with it times would go back by the suspension.
+        self._least_ns, self._most_ns = _narrow_bracket()
         return forward_ns >= _SET_FORWARD_NS or back_ns >= _SET_BACK_NS
 
     def earliest_ns(self, monotonic_ns: int) -> int:
@@ -55,6 +55,11 @@ class ForwardClock:
         self._latest_s = max(wall_s, self._latest_s + read_s - self._read_s)
         self._read_s = read_s
         return self._latest_s
+
+
+def _narrow_bracket() -> tuple[int, int]:
+    """Return the narrowest of several brackets."""
+    return min((_bracket() for _ in range(_READINGS)), key=lambda bracket: bracket[1] - bracket[0])
 
 
 def _bracket() -> tuple[int, int]:

@@ -1,4 +1,5 @@
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -41,6 +42,29 @@ def test_suspended_reading_is_not_taken_for_a_set_clock(monkeypatch):
     for _ in range(5):
         assert not clock.was_set()
     assert waited_ns
+
+
+def test_a_small_step_back_in_a_suspended_reading_puts_no_time_back_by_the_suspension(monkeypatch):
+    now, suspended_ns = SimpleNamespace(monotonic_ns=0, offset_ns=S), [0]
+
+    def monotonic_ns():
+        now.monotonic_ns += 20
+        return now.monotonic_ns
+
+    def time_ns():
+        now.monotonic_ns += 20
+        read_ns = now.monotonic_ns + now.offset_ns
+        now.monotonic_ns += suspended_ns.pop() if suspended_ns else 0
+        return read_ns
+
+    monkeypatch.setattr(time, "monotonic_ns", monotonic_ns)
+    monkeypatch.setattr(time, "time_ns", time_ns)
+    clock = WallClock()
+    before_ns = clock.earliest_ns(0)
+    now.offset_ns -= 200
+    suspended_ns.append(500_000)
+    assert not clock.was_set()
+    assert before_ns - clock.earliest_ns(0) <= 1000
 
 
 def test_a_clock_that_only_goes_forward_passes_no_date_twice(monkeypatch):
