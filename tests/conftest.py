@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import fcntl
+import inspect
 import logging
 import os
 import random
@@ -74,6 +75,16 @@ def run(main: Coroutine[Any, Any, T], *, timeout_s: float = 120.0) -> T:
             return await main
 
     return asyncio.run(with_deadline())
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Run a test that is a coroutine function, with a deadline."""
+    if not inspect.iscoroutinefunction(pyfuncitem.obj):
+        return None
+    arguments = inspect.signature(pyfuncitem.obj).parameters
+    run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in arguments}))
+    return True
 
 
 async def last_value(session: Session, key: str) -> Any:

@@ -69,140 +69,122 @@ def stops(arm):
 
 
 @every_mover("done")
-def test_motions_end_at_their_targets_and_nothing_else_is_sent(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            await arm.in_control()
-            async with kept_control(arm.site):
-                for by in (0.1, -0.1, 0.1):
-                    target = await arm.moved(by)
-                    await until(lambda target=target: near(arm.positions(), target))
-                await until(lambda: arm.site.controller.activity == STATE.IDLE)
-                await rests_for_good(arm, motions=3)
-            assert near(arm.positions(), target)
-            assert not arm.site.controller.HasField("stop")
-            assert stops(arm) == arm.stops
-            declared = {True: STATE.YES, False: STATE.NO, None: STATE.UNKNOWN}[arm.dies_with_link]
-            assert arm.site.controller.capabilities.dies_with_link == declared
-
-    run(main())
+async def test_motions_end_at_their_targets_and_nothing_else_is_sent(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        await arm.in_control()
+        async with kept_control(arm.site):
+            for by in (0.1, -0.1, 0.1):
+                target = await arm.moved(by)
+                await until(lambda target=target: near(arm.positions(), target))
+            await until(lambda: arm.site.controller.activity == STATE.IDLE)
+            await rests_for_good(arm, motions=3)
+        assert near(arm.positions(), target)
+        assert not arm.site.controller.HasField("stop")
+        assert stops(arm) == arm.stops
+        declared = {True: STATE.YES, False: STATE.NO, None: STATE.UNKNOWN}[arm.dies_with_link]
+        assert arm.site.controller.capabilities.dies_with_link == declared
 
 
 @every_mover("stop")
-def test_a_stop_ends_the_motion_for_good_and_its_reset_moves_nothing(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin()
-            assert (await arm.site.stop(by="wang")).sent
+async def test_a_stop_ends_the_motion_for_good_and_its_reset_moves_nothing(
+    mesh, tmp_path, monkeypatch, mover
+):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin()
+        assert (await arm.site.stop(by="wang")).sent
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
+        assert "stop 1 is latched" in await refusal(arm.move(0.1))
+        async with kept_control(arm.site):
+            await arm.reset()
             await rests_for_good(arm)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-            assert "stop 1 is latched" in await refusal(arm.move(0.1))
-            async with kept_control(arm.site):
-                await arm.reset()
-                await rests_for_good(arm)
-                await arm.moved(-0.1)
-                await until(arm.moves)
-                await rests_for_good(arm, motions=2)
-
-    run(main())
+            await arm.moved(-0.1)
+            await until(arm.moves)
+            await rests_for_good(arm, motions=2)
 
 
 @every_mover("local")
-def test_local_control_and_back_within_a_motion_never_continues_it(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin()
-            arm.go_local()
-            await until(lambda: arm.site.controller.mode == STATE.LOCAL)
-            await until(lambda: stops(arm) == arm.local_stops)
-            await arm.site.lease(A.RENEW, ttl_s=5)
-            await until(lambda: arm.site.controller.HasField("stop"))
-            allowed = {arm.causes.get("local"), "stop.went_local", "stop.fate_unknown"}
-            assert codes_of(arm.site.controller.stop.why) & allowed
-            if arm.local_stops == NOT_NOW:
-                # The controller refuses the stop.
-                await until(
-                    lambda: any("refuses" in each.text for each in arm.site.events("controller.alarm"))
-                )
-                assert arm.moves()
-            else:
-                await until(lambda: not arm.moves())
-            arm.go_remote()
-            await until(lambda: arm.site.controller.mode == STATE.REMOTE)
-            await rests_for_good(arm)
-            await until(lambda: stops(arm) == arm.stops)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-            await arm.reset()
-            target = await arm.moved(-0.1)
-            await until(lambda: near(arm.positions(), target))
-
-    run(main())
+async def test_local_control_and_back_within_a_motion_never_continues_it(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin()
+        arm.go_local()
+        await until(lambda: arm.site.controller.mode == STATE.LOCAL)
+        await until(lambda: stops(arm) == arm.local_stops)
+        await arm.site.lease(A.RENEW, ttl_s=5)
+        await until(lambda: arm.site.controller.HasField("stop"))
+        allowed = {arm.causes.get("local"), "stop.went_local", "stop.fate_unknown"}
+        assert codes_of(arm.site.controller.stop.why) & allowed
+        if arm.local_stops == NOT_NOW:
+            # The controller refuses the stop.
+            await until(lambda: any("refuses" in each.text for each in arm.site.events("controller.alarm")))
+            assert arm.moves()
+        else:
+            await until(lambda: not arm.moves())
+        arm.go_remote()
+        await until(lambda: arm.site.controller.mode == STATE.REMOTE)
+        await rests_for_good(arm)
+        await until(lambda: stops(arm) == arm.stops)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
+        await arm.reset()
+        target = await arm.moved(-0.1)
+        await until(lambda: near(arm.positions(), target))
 
 
 @pytest.mark.parametrize(
     ("mover", "hazard"), [(mover, each) for mover in MOVERS for each in mover.hazards], ids=id_of
 )
-def test_what_others_do_within_a_motion_is_a_stop(mesh, tmp_path, monkeypatch, mover, hazard):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin()
-            happens, ends, code = arm.hazards[hazard]
-            await happens(arm)
-            await stopped_for(arm.site, code)
-            await until(lambda: not arm.moves())
-            # Whatever ends the obstacle, the motion does not go on.
-            ends(arm)
-            await rests_for_good(arm)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-
-    run(main())
+async def test_what_others_do_within_a_motion_is_a_stop(mesh, tmp_path, monkeypatch, mover, hazard):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin()
+        happens, ends, code = arm.hazards[hazard]
+        await happens(arm)
+        await stopped_for(arm.site, code)
+        await until(lambda: not arm.moves())
+        # Whatever ends the obstacle, the motion does not go on.
+        ends(arm)
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
 
 
 @every_mover("foreign")
-def test_a_program_of_others_between_motions_ends_control_and_the_stop_ends_it_if_declared(
+async def test_a_program_of_others_between_motions_ends_control_and_the_stop_ends_it_if_declared(
     mesh, tmp_path, monkeypatch, mover
 ):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin(0.05)
-            async with kept_control(arm.site):
-                await until(lambda: near(arm.positions(), target))
-                await until(lambda: not arm.site.seen["lease"][-1].motion)
-                said = stops(arm)
-                await arm.start_foreign()
-                await until(lambda: arm.site.events("motion.foreign"))
-            await until(lambda: arm.site.seen["lease"][-1].holder == "")
-            # The gateway has stopped what may have been the holder's motion.
-            await until(lambda: arm.site.controller.stop.sent)
-            await a_stop_has_ended(arm, said)
-
-    run(main())
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin(0.05)
+        async with kept_control(arm.site):
+            await until(lambda: near(arm.positions(), target))
+            await until(lambda: not arm.site.seen["lease"][-1].motion)
+            said = stops(arm)
+            await arm.start_foreign()
+            await until(lambda: arm.site.events("motion.foreign"))
+        await until(lambda: arm.site.seen["lease"][-1].holder == "")
+        # The gateway has stopped what may have been the holder's motion.
+        await until(lambda: arm.site.controller.stop.sent)
+        await a_stop_has_ended(arm, said)
 
 
 @every_mover("foreign in local")
-def test_in_local_control_a_stop_ends_a_program_of_others_only_if_the_state_says_so(
+async def test_in_local_control_a_stop_ends_a_program_of_others_only_if_the_state_says_so(
     mesh, tmp_path, monkeypatch, mover
 ):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            await arm.in_control()
-            await arm.start_foreign()
-            await until(lambda: arm.site.events("motion.foreign"))
-            await until(lambda: arm.site.seen["lease"][-1].holder == "")
-            assert not arm.site.controller.HasField("stop")
-            await until(lambda: arm.site.controller.activity == STATE.MOVING)
-            await arm.site.units(20)
-            await arm.site.lease(A.ACQUIRE, ttl_s=5)
-            if not arm.replaces:
-                await refusal(arm.move(0.1))
-            arm.go_local()
-            await until(lambda: arm.site.controller.mode == STATE.LOCAL)
-            await until(lambda: stops(arm) == arm.local_stops)
-            assert "local" in await refusal(arm.move(0.1))
-            await arm.site.stop(by="wang")
-            await a_stop_has_ended(arm, arm.local_stops, motions=0)
-
-    run(main())
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        await arm.in_control()
+        await arm.start_foreign()
+        await until(lambda: arm.site.events("motion.foreign"))
+        await until(lambda: arm.site.seen["lease"][-1].holder == "")
+        assert not arm.site.controller.HasField("stop")
+        await until(lambda: arm.site.controller.activity == STATE.MOVING)
+        await arm.site.units(20)
+        await arm.site.lease(A.ACQUIRE, ttl_s=5)
+        if not arm.replaces:
+            await refusal(arm.move(0.1))
+        arm.go_local()
+        await until(lambda: arm.site.controller.mode == STATE.LOCAL)
+        await until(lambda: stops(arm) == arm.local_stops)
+        assert "local" in await refusal(arm.move(0.1))
+        await arm.site.stop(by="wang")
+        await a_stop_has_ended(arm, arm.local_stops, motions=0)
 
 
 async def a_stop_has_ended(arm, said, *, motions=1):
@@ -215,230 +197,200 @@ async def a_stop_has_ended(arm, said, *, motions=1):
 
 
 @every_mover("tool")
-def test_a_tool_changed_by_others_leaves_motions_unchecked_and_ends_one(mesh, tmp_path, monkeypatch, mover):
+async def test_a_tool_changed_by_others_leaves_motions_unchecked_and_ends_one(
+    mesh, tmp_path, monkeypatch, mover
+):
     # Nothing is checked here: no process is needed.
     monkeypatch.setattr(Checker, "problem", lambda self, robot: None)
-
-    async def main():
-        async with mover.started(mesh, tmp_path / "first", monkeypatch, check="require") as arm:
-            await arm.in_control()
-            await until(lambda: not arm.site.controller.check_text)
-            undo = arm.change_tool()
-            await until(lambda: arm.site.controller.check_reason.code == "check.tool_changed")
-            await arm.site.lease(A.RENEW, ttl_s=5)
-            assert "were changed at the controller" in await refusal(arm.move(0.1))
-            undo()
-            await until(lambda: not arm.site.controller.check_text)
-            judge(arm, motions=0)
-        async with mover.started(mesh, tmp_path / "second", monkeypatch) as arm:
-            target = await arm.begin()
-            arm.change_tool()
-            await is_stopped(arm, "tool")
-            await rests_for_good(arm)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-
-    run(main())
+    async with mover.started(mesh, tmp_path / "first", monkeypatch, check="require") as arm:
+        await arm.in_control()
+        await until(lambda: not arm.site.controller.check_text)
+        undo = arm.change_tool()
+        await until(lambda: arm.site.controller.check_reason.code == "check.tool_changed")
+        await arm.site.lease(A.RENEW, ttl_s=5)
+        assert "were changed at the controller" in await refusal(arm.move(0.1))
+        undo()
+        await until(lambda: not arm.site.controller.check_text)
+        judge(arm, motions=0)
+    async with mover.started(mesh, tmp_path / "second", monkeypatch) as arm:
+        target = await arm.begin()
+        arm.change_tool()
+        await is_stopped(arm, "tool")
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
 
 
 @every_mover("corrupted")
-def test_one_corrupted_position_stops_the_motion_and_is_never_published(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin()
-            arm.corrupt()
-            await until(lambda: arm.site.controller.HasField("stop"))
-            event = await arm.site.event("controller.joint_values", 0)
-            assert codes_of(event.reason) & {"joints.far", "joints.leap"}
-            await rests_for_good(arm)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-            assert len(arm.site.events("controller.joint_values")) == 1
-            furthest = max(abs(each.joints[0].position) for each in arm.site.seen["joints"])
-            assert furthest < 4.0
-
-    run(main())
+async def test_one_corrupted_position_stops_the_motion_and_is_never_published(
+    mesh, tmp_path, monkeypatch, mover
+):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin()
+        arm.corrupt()
+        await until(lambda: arm.site.controller.HasField("stop"))
+        event = await arm.site.event("controller.joint_values", 0)
+        assert codes_of(event.reason) & {"joints.far", "joints.leap"}
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
+        assert len(arm.site.events("controller.joint_values")) == 1
+        furthest = max(abs(each.joints[0].position) for each in arm.site.seen["joints"])
+        assert furthest < 4.0
 
 
 @every_mover("override")
-def test_an_override_of_others_slows_the_motion_only(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin(0.15)
-            await arm.slow_down()
-            async with kept_control(arm.site):
-                await until(lambda: near(arm.positions(), target))
-                await rests_for_good(arm)
-            assert not arm.site.controller.HasField("stop")
-
-    run(main())
+async def test_an_override_of_others_slows_the_motion_only(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin(0.15)
+        await arm.slow_down()
+        async with kept_control(arm.site):
+            await until(lambda: near(arm.positions(), target))
+            await rests_for_good(arm)
+        assert not arm.site.controller.HasField("stop")
 
 
 @every_mover("stop channel")
-def test_motion_needs_the_connection_of_its_stop(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch, accept_unknown=frozenset({"mode"})) as arm:
-            await arm.in_control()
-            arm.cut_stop()
-            await until(lambda: stops(arm) == NOT_NOW)
-            assert arm.site.controller.link == STATE.UP
-            await arm.site.lease(A.RENEW, ttl_s=5)
-            assert "a stop could not be sent" in await refusal(arm.move(0.1))
-            judge(arm, motions=0)
-            await arm.mend_stop()
-            target = await arm.begin()
-            arm.cut_stop()
-            await is_stopped(arm, "stop channel")
-            await until(lambda: stops(arm) == NOT_NOW)
-            assert arm.site.controller.link == STATE.UP
-            await arm.mend_stop()
-            await until(lambda: arm.site.controller.stop.sent)
-            await rests_for_good(arm)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-
-    run(main())
+async def test_motion_needs_the_connection_of_its_stop(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch, accept_unknown=frozenset({"mode"})) as arm:
+        await arm.in_control()
+        arm.cut_stop()
+        await until(lambda: stops(arm) == NOT_NOW)
+        assert arm.site.controller.link == STATE.UP
+        await arm.site.lease(A.RENEW, ttl_s=5)
+        assert "a stop could not be sent" in await refusal(arm.move(0.1))
+        judge(arm, motions=0)
+        await arm.mend_stop()
+        target = await arm.begin()
+        arm.cut_stop()
+        await is_stopped(arm, "stop channel")
+        await until(lambda: stops(arm) == NOT_NOW)
+        assert arm.site.controller.link == STATE.UP
+        await arm.mend_stop()
+        await until(lambda: arm.site.controller.stop.sent)
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
 
 
 @every_mover("late")
-def test_a_motion_that_arrives_after_its_stop_moves_nothing(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            await arm.in_control()
-            release = arm.keep_back()
-            here = arm.positions()
-            await arm.moved(1.5)
-            if not arm.watches:
-                await arm.site.stop(by="wang")
-            await is_stopped(arm, "late")
-            release()
-            await rests_for_good(arm)
-            assert abs(arm.positions()[0] - here[0]) < 0.05
-
-    run(main())
+async def test_a_motion_that_arrives_after_its_stop_moves_nothing(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        await arm.in_control()
+        release = arm.keep_back()
+        here = arm.positions()
+        await arm.moved(1.5)
+        if not arm.watches:
+            await arm.site.stop(by="wang")
+        await is_stopped(arm, "late")
+        release()
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - here[0]) < 0.05
 
 
 @every_mover("reply")
-def test_a_motion_whose_reply_is_lost_is_not_sent_again(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            await arm.in_control()
-            await arm.lose_reply()
-            target = await arm.moved(0.2)
-            async with kept_control(arm.site):
-                await until(lambda: near(arm.positions(), target))
-                if "reply" in arm.causes:
-                    await is_stopped(arm, "reply")
-                await rests_for_good(arm)
-
-    run(main())
+async def test_a_motion_whose_reply_is_lost_is_not_sent_again(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        await arm.in_control()
+        await arm.lose_reply()
+        target = await arm.moved(0.2)
+        async with kept_control(arm.site):
+            await until(lambda: near(arm.positions(), target))
+            if "reply" in arm.causes:
+                await is_stopped(arm, "reply")
+            await rests_for_good(arm)
 
 
 @pytest.mark.parametrize("way", ["cut", "half-open", "frozen"])
 @every_mover("lost link")
-def test_a_lost_link_stops_the_motion_as_declared_and_never_sends_it_again(
+async def test_a_lost_link_stops_the_motion_as_declared_and_never_sends_it_again(
     mesh, tmp_path, monkeypatch, mover, way
 ):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch, **QUICK) as arm:
-            target = await arm.begin(0.6 if arm.dies_with_link else 0.25)
-            if way == "frozen":
-                arm.fault("freeze")
-            for each in arm.wires.values():
-                if way == "cut":
-                    each.cut()
-                each.swallows = way == "half-open"
-            await until(lambda: arm.site.controller.HasField("stop"))
-            await until(lambda: not arm.moves())
-            assert near(arm.positions(), target) is not bool(arm.dies_with_link)
-            before = arm.words().count("stop")
-            if way == "frozen":
-                arm.end_fault("freeze")
-            for each in arm.wires.values():
-                if way == "cut":
-                    await each.open()
-                each.swallows = False
-            # The latched stop is delivered. What a frozen controller has not read, it reads now.
-            least = before if way == "frozen" else before + 1
-            await until(lambda: arm.site.controller.stop.sent and arm.words().count("stop") >= least)
-            await rests_for_good(arm)
-
-    run(main())
+    async with mover.started(mesh, tmp_path, monkeypatch, **QUICK) as arm:
+        target = await arm.begin(0.6 if arm.dies_with_link else 0.25)
+        if way == "frozen":
+            arm.fault("freeze")
+        for each in arm.wires.values():
+            if way == "cut":
+                each.cut()
+            each.swallows = way == "half-open"
+        await until(lambda: arm.site.controller.HasField("stop"))
+        await until(lambda: not arm.moves())
+        assert near(arm.positions(), target) is not bool(arm.dies_with_link)
+        before = arm.words().count("stop")
+        if way == "frozen":
+            arm.end_fault("freeze")
+        for each in arm.wires.values():
+            if way == "cut":
+                await each.open()
+            each.swallows = False
+        # The latched stop is delivered. What a frozen controller has not read, it reads now.
+        least = before if way == "frozen" else before + 1
+        await until(lambda: arm.site.controller.stop.sent and arm.words().count("stop") >= least)
+        await rests_for_good(arm)
 
 
 @every_mover("restart")
-def test_a_restart_of_the_controller_within_a_motion_is_a_stop(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch, **QUICK) as arm:
-            await arm.begin()
-            before = arm.arm
-            arm.fault("restart+0.3")
-            await until(lambda: arm.site.controller.HasField("stop"))
-            await until(lambda: arm.arm is not before)
-            await until(lambda: arm.site.controller.stop.sent)
-            await rests_for_good(arm)
-            # The controller's clock begins again; the stamps go on.
-            stamps = [each.timestamp.ToNanoseconds() for each in arm.site.seen["joints"]]
-            assert stamps == sorted(stamps)
-            await until(lambda: stops(arm) != NOT_NOW)
-
-    run(main())
+async def test_a_restart_of_the_controller_within_a_motion_is_a_stop(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch, **QUICK) as arm:
+        await arm.begin()
+        before = arm.arm
+        arm.fault("restart+0.3")
+        await until(lambda: arm.site.controller.HasField("stop"))
+        await until(lambda: arm.arm is not before)
+        await until(lambda: arm.site.controller.stop.sent)
+        await rests_for_good(arm)
+        # The controller's clock begins again; the stamps go on.
+        stamps = [each.timestamp.ToNanoseconds() for each in arm.site.seen["joints"]]
+        assert stamps == sorted(stamps)
+        await until(lambda: stops(arm) != NOT_NOW)
 
 
 @every_mover("seat")
-def test_a_taken_seat_is_named_and_forbids_motion(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch, prepare=mover.take_seat, up=False) as arm:
-            site = arm.site
-            await until(lambda: site.seen.get("controller"))
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            await until(lambda: any(arm.seat in each.text for each in site.seen["events"]))
-            await site.lease(A.RENEW, ttl_s=5)
-            await refusal(arm.move(0.1))
-            judge(arm, motions=0)
-            arm.free_seat()
-            async with kept_control(site):
-                target = await arm.moved(0.05)
-                await until(lambda: near(arm.positions(), target))
-            await rests_for_good(arm)
-
-    run(main())
+async def test_a_taken_seat_is_named_and_forbids_motion(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch, prepare=mover.take_seat, up=False) as arm:
+        site = arm.site
+        await until(lambda: site.seen.get("controller"))
+        await site.lease(A.ACQUIRE, ttl_s=5)
+        await until(lambda: any(arm.seat in each.text for each in site.seen["events"]))
+        await site.lease(A.RENEW, ttl_s=5)
+        await refusal(arm.move(0.1))
+        judge(arm, motions=0)
+        arm.free_seat()
+        async with kept_control(site):
+            target = await arm.moved(0.05)
+            await until(lambda: near(arm.positions(), target))
+        await rests_for_good(arm)
 
 
 @every_mover("fault")
-def test_a_fault_of_the_controller_ends_the_motion_for_good(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin()
-            arm.fault("fault")
-            if arm.watches:
-                await is_stopped(arm, "fault")
-            shown = arm.fault_is_shown_as
-            await until(lambda: arm.site.controller.activity == shown)
-            await until(lambda: not arm.moves())
-            await arm.site.lease(A.RENEW, ttl_s=5)
-            await refusal(arm.move(0.1))
-            arm.end_fault("fault")
-            await until(lambda: arm.site.controller.activity != shown)
-            await rests_for_good(arm)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-
-    run(main())
+async def test_a_fault_of_the_controller_ends_the_motion_for_good(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin()
+        arm.fault("fault")
+        if arm.watches:
+            await is_stopped(arm, "fault")
+        shown = arm.fault_is_shown_as
+        await until(lambda: arm.site.controller.activity == shown)
+        await until(lambda: not arm.moves())
+        await arm.site.lease(A.RENEW, ttl_s=5)
+        await refusal(arm.move(0.1))
+        arm.end_fault("fault")
+        await until(lambda: arm.site.controller.activity != shown)
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
 
 
 @every_mover("stop of others")
-def test_a_stop_by_another_client_of_the_controller_ends_the_motion(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            target = await arm.begin()
-            await arm.stop_elsewhere()
-            await rests_for_good(arm)
-            assert abs(arm.positions()[0] - target[0]) > 0.3
-            # The operator is told.
-            if "stop of others" in arm.causes:
-                await is_stopped(arm, "stop of others")
-            else:
-                shown = arm.site.events("controller.alarm")
-                await until(lambda: shown or arm.site.controller.activity == STATE.STOPPED)
-
-    run(main())
+async def test_a_stop_by_another_client_of_the_controller_ends_the_motion(mesh, tmp_path, monkeypatch, mover):
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        target = await arm.begin()
+        await arm.stop_elsewhere()
+        await rests_for_good(arm)
+        assert abs(arm.positions()[0] - target[0]) > 0.3
+        # The operator is told.
+        if "stop of others" in arm.causes:
+            await is_stopped(arm, "stop of others")
+        else:
+            shown = arm.site.events("controller.alarm")
+            await until(lambda: shown or arm.site.controller.activity == STATE.STOPPED)
 
 
 @pytest.mark.parametrize(
@@ -451,43 +403,37 @@ def test_a_stop_by_another_client_of_the_controller_ends_the_motion(mesh, tmp_pa
     ids=["late", "doubled", "reordered"],
 )
 @every_mover("datagrams")
-def test_datagrams_that_the_network_disturbs_move_the_arm_once(
+async def test_datagrams_that_the_network_disturbs_move_the_arm_once(
     mesh, tmp_path, monkeypatch, mover, way, delays, copies
 ):
-    async def main():
-        async with mover.started(mesh, tmp_path, monkeypatch) as arm:
-            await arm.in_control()
-            for each in arm.wires.values():
-                each.delays = itertools.cycle(delays)
-                each.commands = each.answers = lambda data: [data] * copies
-            async with kept_control(arm.site):
-                target = await arm.moved(0.2)
-                await until(lambda: near(arm.positions(), target))
-                await rests_for_good(arm)
-            assert arm.arm.commands == 1
-            assert not arm.site.controller.HasField("stop")
-
-    run(main())
+    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+        await arm.in_control()
+        for each in arm.wires.values():
+            each.delays = itertools.cycle(delays)
+            each.commands = each.answers = lambda data: [data] * copies
+        async with kept_control(arm.site):
+            target = await arm.moved(0.2)
+            await until(lambda: near(arm.positions(), target))
+            await rests_for_good(arm)
+        assert arm.arm.commands == 1
+        assert not arm.site.controller.HasField("stop")
 
 
 @every_mover("axes")
-def test_other_axes_after_a_restart_forbid_motion(mesh, tmp_path, monkeypatch, mover):
-    async def main():
-        impatient = {"stale_after_s": 0.4, "reconnect_after_s": 0.6}
-        async with mover.started(mesh, tmp_path, monkeypatch, **impatient) as arm:
-            await arm.in_control()
-            before = arm.arm
-            arm.fault("restart+0.9")
-            arm.fault("joints")
-            await until(lambda: arm.site.controller.link != STATE.UP)
-            await until(lambda: arm.arm is not before)
-            arm.arm._servo_on = True
-            async with kept_control(arm.site), asyncio.timeout(30.0):
-                while not re.search("axis|axes|joint values", await refusal(arm.move(0.1))):
-                    await asyncio.sleep(0.05)
-            judge(arm, motions=0)
-
-    run(main())
+async def test_other_axes_after_a_restart_forbid_motion(mesh, tmp_path, monkeypatch, mover):
+    impatient = {"stale_after_s": 0.4, "reconnect_after_s": 0.6}
+    async with mover.started(mesh, tmp_path, monkeypatch, **impatient) as arm:
+        await arm.in_control()
+        before = arm.arm
+        arm.fault("restart+0.9")
+        arm.fault("joints")
+        await until(lambda: arm.site.controller.link != STATE.UP)
+        await until(lambda: arm.arm is not before)
+        arm.arm._servo_on = True
+        async with kept_control(arm.site), asyncio.timeout(30.0):
+            while not re.search("axis|axes|joint values", await refusal(arm.move(0.1))):
+                await asyncio.sleep(0.05)
+        judge(arm, motions=0)
 
 
 @contextlib.asynccontextmanager

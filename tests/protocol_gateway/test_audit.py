@@ -51,16 +51,13 @@ def test_a_reopened_log_continues_its_chain(tmp_path):
     assert verify(path).entries == 2
 
 
-def test_concurrent_entries_keep_the_order_of_the_calls(tmp_path):
-    async def main():
-        seen = []
-        log = AuditLog(tmp_path / "arm.jsonl", on_written=seen.append)
-        await asyncio.gather(*(log.append(entry(id=str(number))) for number in range(200)))
-        await log.close()
-        assert [each.values["id"] for each in seen] == [str(number) for number in range(200)]
-        assert verify(log.path).entries == 200
-
-    run(main())
+async def test_concurrent_entries_keep_the_order_of_the_calls(tmp_path):
+    seen = []
+    log = AuditLog(tmp_path / "arm.jsonl", on_written=seen.append)
+    await asyncio.gather(*(log.append(entry(id=str(number))) for number in range(200)))
+    await log.close()
+    assert [each.values["id"] for each in seen] == [str(number) for number in range(200)]
+    assert verify(log.path).entries == 200
 
 
 def test_the_hash_covers_the_line_without_the_hash(tmp_path):
@@ -125,14 +122,11 @@ def test_a_broken_chain_is_reported_and_not_repaired(tmp_path):
     assert verify(path).first_break == 2
 
 
-def test_two_gateways_do_not_write_one_log(tmp_path):
-    async def main():
-        log = AuditLog(tmp_path / "arm.jsonl")
-        with pytest.raises(AuditError, match="open in another gateway"):
-            AuditLog(tmp_path / "arm.jsonl")
-        await log.close()
-
-    run(main())
+async def test_two_gateways_do_not_write_one_log(tmp_path):
+    log = AuditLog(tmp_path / "arm.jsonl")
+    with pytest.raises(AuditError, match="open in another gateway"):
+        AuditLog(tmp_path / "arm.jsonl")
+    await log.close()
 
 
 def test_a_folder_that_cannot_be_created_is_an_error(tmp_path):
@@ -141,44 +135,38 @@ def test_a_folder_that_cannot_be_created_is_an_error(tmp_path):
         AuditLog(tmp_path / "file" / "arm.jsonl")
 
 
-def test_a_full_disk_rejects_commands_and_delays_past_events(tmp_path):
-    async def main():
-        log = AuditLog(tmp_path / "arm.jsonl")
-        await log.append(entry(id="1"))
-        kept, full = os.dup(log._file), os.open("/dev/full", os.O_RDWR)
-        os.dup2(full, log._file)
-        with pytest.raises(AuditError, match="No space left on device"):
-            await log.append(entry(id="refused"))
-        with pytest.raises(AuditError):
-            await log.append_later(entry("STOP", id="owed"))
-        os.dup2(kept, log._file)
-        await log.append(entry(id="2"))
-        await log.close()
-        os.close(kept)
-        os.close(full)
-        assert [each.values["id"] for each in read_entries(log.path)] == ["1", "owed", "2"]
-        assert verify(log.path).ok
-
-    run(main())
+async def test_a_full_disk_rejects_commands_and_delays_past_events(tmp_path):
+    log = AuditLog(tmp_path / "arm.jsonl")
+    await log.append(entry(id="1"))
+    kept, full = os.dup(log._file), os.open("/dev/full", os.O_RDWR)
+    os.dup2(full, log._file)
+    with pytest.raises(AuditError, match="No space left on device"):
+        await log.append(entry(id="refused"))
+    with pytest.raises(AuditError):
+        await log.append_later(entry("STOP", id="owed"))
+    os.dup2(kept, log._file)
+    await log.append(entry(id="2"))
+    await log.close()
+    os.close(kept)
+    os.close(full)
+    assert [each.values["id"] for each in read_entries(log.path)] == ["1", "owed", "2"]
+    assert verify(log.path).ok
 
 
-def test_every_pending_entry_gets_its_error(tmp_path, monkeypatch, caplog):
+async def test_every_pending_entry_gets_its_error(tmp_path, monkeypatch, caplog):
     def broken(entry):
         raise ZeroDivisionError("nobody listens")
 
-    async def main():
-        log = AuditLog(tmp_path / "arm.jsonl", on_written=broken)
-        assert (await log.append(entry(id="1"))).number == 1
-        assert "entry 1 was not published" in caplog.text
-        with monkeypatch.context() as patch:
-            patch.setattr(log, "_write", broken)
-            with pytest.raises(AuditError, match="nobody listens"):
-                await log.append(entry(id="not written"))
-        assert (await log.append(entry(id="2"))).number == 2
-        await log.close()
-        assert verify(log.path).ok
-
-    run(main())
+    log = AuditLog(tmp_path / "arm.jsonl", on_written=broken)
+    assert (await log.append(entry(id="1"))).number == 1
+    assert "entry 1 was not published" in caplog.text
+    with monkeypatch.context() as patch:
+        patch.setattr(log, "_write", broken)
+        with pytest.raises(AuditError, match="nobody listens"):
+            await log.append(entry(id="not written"))
+    assert (await log.append(entry(id="2"))).number == 2
+    await log.close()
+    assert verify(log.path).ok
 
 
 def test_an_invalid_text_is_escaped_and_written(tmp_path):

@@ -180,47 +180,40 @@ def test_changed_bytes_never_lose_a_latched_stop(tmp_path_factory, data):
         assert write(live)[1].stop is not None
 
 
-def test_a_damaged_log_stops_the_robot_until_a_reset(mesh, tmp_path):
-    async def main():
-        async with simulator() as port:
-            async with gateway(mesh, tmp_path, port) as site:
-                await site.lease(A.ACQUIRE, ttl_s=5)
-                await site.stop(by="wang", reason="dog")
-                await until(lambda: len(site.seen["audit"]) >= 2)
-            live = site.audit
-            live.write_bytes(live.read_bytes().replace(b'"request":"STOP"', b'"request":"STOQ"'))
-            async with gateway(mesh, tmp_path, port) as site:
-                stop = site.controller.stop
-                assert (stop.by, stop.reason) == ("gateway", UNKNOWN)
-                assert "the chain is broken at entry 2" in (await site.event("audit.damaged", 0)).text
-                assert await site.event("stop.remembered", 0)
-                await until(lambda: "STOP" in [each.request for each in site.seen["audit"]])
-                await site.lease(A.ACQUIRE, ttl_s=5)
-                assert UNKNOWN in await refusal(site.command(C.HOME))
-                await site.command(C.RESET, stop_id=stop.id)
-                await until(lambda: not site.controller.HasField("stop"))
-            async with gateway(mesh, tmp_path, port) as site:
-                assert not site.controller.HasField("stop")
-                assert site.controller.link == STATE.UP
-
-    run(main())
+async def test_a_damaged_log_stops_the_robot_until_a_reset(mesh, tmp_path):
+    async with simulator() as port:
+        async with gateway(mesh, tmp_path, port) as site:
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.stop(by="wang", reason="dog")
+            await until(lambda: len(site.seen["audit"]) >= 2)
+        live = site.audit
+        live.write_bytes(live.read_bytes().replace(b'"request":"STOP"', b'"request":"STOQ"'))
+        async with gateway(mesh, tmp_path, port) as site:
+            stop = site.controller.stop
+            assert (stop.by, stop.reason) == ("gateway", UNKNOWN)
+            assert "the chain is broken at entry 2" in (await site.event("audit.damaged", 0)).text
+            assert await site.event("stop.remembered", 0)
+            await until(lambda: "STOP" in [each.request for each in site.seen["audit"]])
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            assert UNKNOWN in await refusal(site.command(C.HOME))
+            await site.command(C.RESET, stop_id=stop.id)
+            await until(lambda: not site.controller.HasField("stop"))
+        async with gateway(mesh, tmp_path, port) as site:
+            assert not site.controller.HasField("stop")
+            assert site.controller.link == STATE.UP
 
 
-def test_a_read_only_robot_shows_no_stop_but_its_log_keeps_it(mesh, tmp_path):
+async def test_a_read_only_robot_shows_no_stop_but_its_log_keeps_it(mesh, tmp_path):
     live = tmp_path / "hall" / "arm.jsonl"
     write(live, *STOPPED)
     changed(1)(live)
-
-    async def main():
-        async with simulator() as port:
-            async with gateway(mesh, tmp_path, port, stop_proven=False) as site:
-                await until(lambda: site.events("audit.damaged"))
-                await until(lambda: site.seen["audit"] and site.seen["audit"][-1].request == "STOP")
-                assert not site.controller.HasField("stop")
-            async with gateway(mesh, tmp_path, port) as site:
-                assert site.controller.stop.reason == UNKNOWN
-
-    run(main())
+    async with simulator() as port:
+        async with gateway(mesh, tmp_path, port, stop_proven=False) as site:
+            await until(lambda: site.events("audit.damaged"))
+            await until(lambda: site.seen["audit"] and site.seen["audit"][-1].request == "STOP")
+            assert not site.controller.HasField("stop")
+        async with gateway(mesh, tmp_path, port) as site:
+            assert site.controller.stop.reason == UNKNOWN
 
 
 # ----------------------------------------------------------------------- arbitrary lines
@@ -262,21 +255,18 @@ def _with(line, name, digits):
 # ----------------------------------------------------------------------------- the disk
 
 
-def test_the_rest_of_an_incomplete_write_is_removed(tmp_path, monkeypatch):
-    async def main():
-        log = AuditLog(tmp_path / "arm.jsonl")
-        await log.append(entry(id="1"))
-        pwrite = os.pwrite
-        monkeypatch.setattr(os, "pwrite", lambda file, data, offset: _half(pwrite, file, data, offset))
-        with pytest.raises(AuditError, match="No space left"):
-            await log.append(entry(text="x" * 2000))
-        monkeypatch.undo()
-        await log.append(entry(id="2"))
-        assert [each.values["id"] for each in read_entries(log.path)] == ["1", "2"]
-        await log.close()
-        assert verify(log.path).ok
-
-    run(main())
+async def test_the_rest_of_an_incomplete_write_is_removed(tmp_path, monkeypatch):
+    log = AuditLog(tmp_path / "arm.jsonl")
+    await log.append(entry(id="1"))
+    pwrite = os.pwrite
+    monkeypatch.setattr(os, "pwrite", lambda file, data, offset: _half(pwrite, file, data, offset))
+    with pytest.raises(AuditError, match="No space left"):
+        await log.append(entry(text="x" * 2000))
+    monkeypatch.undo()
+    await log.append(entry(id="2"))
+    assert [each.values["id"] for each in read_entries(log.path)] == ["1", "2"]
+    await log.close()
+    assert verify(log.path).ok
 
 
 def _half(pwrite, file, data, offset):
@@ -284,7 +274,7 @@ def _half(pwrite, file, data, offset):
     raise OSError(28, "No space left on device")
 
 
-def test_an_entry_and_its_file_name_are_synced_before_the_confirmation(tmp_path, monkeypatch):
+async def test_an_entry_and_its_file_name_are_synced_before_the_confirmation(tmp_path, monkeypatch):
     folder, live = tmp_path / "hall", tmp_path / "hall" / "arm.jsonl"
     synced, fsync = [], os.fsync
 
@@ -292,15 +282,12 @@ def test_an_entry_and_its_file_name_are_synced_before_the_confirmation(tmp_path,
         synced.append(str(Path(f"/proc/self/fd/{file}").readlink()))
         fsync(file)
 
-    async def main():
-        log = AuditLog(live, rotate_bytes=1)
-        monkeypatch.setattr(os, "fsync", spy)
-        await log.append(entry())
-        assert synced == [str(live), str(folder)]
-        synced.clear()
-        await log.append(entry())
-        # The new file's first entry is synced before its rename.
-        assert synced == [str(live.with_suffix(".new")), str(live), str(folder)]
-        await log.close()
-
-    run(main())
+    log = AuditLog(live, rotate_bytes=1)
+    monkeypatch.setattr(os, "fsync", spy)
+    await log.append(entry())
+    assert synced == [str(live), str(folder)]
+    synced.clear()
+    await log.append(entry())
+    # The new file's first entry is synced before its rename.
+    assert synced == [str(live.with_suffix(".new")), str(live), str(folder)]
+    await log.close()

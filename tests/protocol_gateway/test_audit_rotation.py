@@ -226,29 +226,23 @@ def test_a_log_that_cannot_be_rotated_continues_in_its_file(tmp_path, caplog):
     assert verify(live).ok
 
 
-def test_the_lock_survives_a_rotation(tmp_path):
-    async def main():
-        log = AuditLog(tmp_path / "arm.jsonl", rotate_bytes=1)
-        for number in range(3):
-            await log.append(entry(number))
-        with pytest.raises(Exception, match="open in another gateway"):
-            AuditLog(tmp_path / "arm.jsonl")
-        await log.close()
-
-    run(main())
+async def test_the_lock_survives_a_rotation(tmp_path):
+    log = AuditLog(tmp_path / "arm.jsonl", rotate_bytes=1)
+    for number in range(3):
+        await log.append(entry(number))
+    with pytest.raises(Exception, match="open in another gateway"):
+        AuditLog(tmp_path / "arm.jsonl")
+    await log.close()
 
 
-def test_a_line_that_the_gateway_is_still_writing_is_no_break(tmp_path):
-    async def main():
-        log = AuditLog(tmp_path / "arm.jsonl")
-        await log.append(entry())
-        with log.path.open("ab") as file:
-            file.write(b'{"hash":"12')
-        assert verify(log.path).ok
-        await log.close()
-        assert verify(log.path).first_break == 2
-
-    run(main())
+async def test_a_line_that_the_gateway_is_still_writing_is_no_break(tmp_path):
+    log = AuditLog(tmp_path / "arm.jsonl")
+    await log.append(entry())
+    with log.path.open("ab") as file:
+        file.write(b'{"hash":"12')
+    assert verify(log.path).ok
+    await log.close()
+    assert verify(log.path).first_break == 2
 
 
 def test_a_line_that_is_too_long_does_not_hide_later_ones(tmp_path):
@@ -344,25 +338,22 @@ def test_a_search_for_too_many_entries_is_refused():
         query_of(schema.AuditQuery(most=10_001))
 
 
-def test_failed_entries_are_kept_up_to_a_limit_and_the_rest_is_counted(tmp_path):
-    async def main():
-        log = AuditLog(tmp_path / "arm.jsonl")
-        kept, full = os.dup(log._file), os.open("/dev/full", os.O_RDWR)
-        os.dup2(full, log._file)
-        refused = [log.append_later(entry(n, outcome=Outcome.REFUSED)) for n in range(3000)]
-        stops = [log.append_later(entry(n, "STOP")) for n in range(20)]
-        done = await asyncio.gather(*refused, *stops, return_exceptions=True)
-        assert {type(each).__name__ for each in done} == {"AuditError"}
-        os.dup2(kept, log._file)
-        log.retry()
-        await log.close()
-        os.close(kept)
-        os.close(full)
-        found = list(read_entries(log.path))
-        assert [each.request for each in found].count("STOP") == 20
-        (lost,) = [each for each in found if each.request == "LOST"]
-        assert len(found) - 1 + int(lost.values["requests"]) == 3020
-        assert len(found) < 1100
-        assert verify(log.path).ok
-
-    run(main())
+async def test_failed_entries_are_kept_up_to_a_limit_and_the_rest_is_counted(tmp_path):
+    log = AuditLog(tmp_path / "arm.jsonl")
+    kept, full = os.dup(log._file), os.open("/dev/full", os.O_RDWR)
+    os.dup2(full, log._file)
+    refused = [log.append_later(entry(n, outcome=Outcome.REFUSED)) for n in range(3000)]
+    stops = [log.append_later(entry(n, "STOP")) for n in range(20)]
+    done = await asyncio.gather(*refused, *stops, return_exceptions=True)
+    assert {type(each).__name__ for each in done} == {"AuditError"}
+    os.dup2(kept, log._file)
+    log.retry()
+    await log.close()
+    os.close(kept)
+    os.close(full)
+    found = list(read_entries(log.path))
+    assert [each.request for each in found].count("STOP") == 20
+    (lost,) = [each for each in found if each.request == "LOST"]
+    assert len(found) - 1 + int(lost.values["requests"]) == 3020
+    assert len(found) < 1100
+    assert verify(log.path).ok

@@ -52,30 +52,24 @@ def occupied_path(bench):
         ((C.MOVE_RELATIVE, {"joint_positions": NEAR}), (HERE, FAR, (1.1, 0.0, 0.0, 0.0, 0.0))),
     ],
 )
-def test_a_unit_of_two_motions_occupies_both_paths(tmp_path, second, path):
-    async def main():
-        async with control_bench(tmp_path) as bench:
-            await bench.lease(A.ACQUIRE)
-            bench.status = READY
-            await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
-            path_of_commands = occupied_path(bench)
-            assert [tuple(round(value, 9) for value in each) for each in path_of_commands] == list(path)
-
-    run(main())
+async def test_a_unit_of_two_motions_occupies_both_paths(tmp_path, second, path):
+    async with control_bench(tmp_path) as bench:
+        await bench.lease(A.ACQUIRE)
+        bench.status = READY
+        await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
+        path_of_commands = occupied_path(bench)
+        assert [tuple(round(value, 9) for value in each) for each in path_of_commands] == list(path)
 
 
-def test_resume_and_another_motion_are_two_units(tmp_path):
-    async def main():
-        async with control_bench(tmp_path) as bench:
-            await bench.lease(A.ACQUIRE)
-            bench.status = READY
-            await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}))
-            bench.status = replace(READY, activity=Activity.HOLDING)
-            with refused(codes.COMMAND_TWO_UNITS):
-                await bench.commands((C.RESUME, {}), (C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), first_id=2)
-            assert len(bench.socket) == 1
-
-    run(main())
+async def test_resume_and_another_motion_are_two_units(tmp_path):
+    async with control_bench(tmp_path) as bench:
+        await bench.lease(A.ACQUIRE)
+        bench.status = READY
+        await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}))
+        bench.status = replace(READY, activity=Activity.HOLDING)
+        with refused(codes.COMMAND_TWO_UNITS):
+            await bench.commands((C.RESUME, {}), (C.MOVE_ABSOLUTE, {"joint_positions": NEAR}), first_id=2)
+        assert len(bench.socket) == 1
 
 
 def test_an_unchecked_robot_is_an_obstacle_for_the_others(mesh, tmp_path):

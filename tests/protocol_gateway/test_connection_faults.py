@@ -21,87 +21,69 @@ from tests.protocol_gateway.gateway_site import STATE, gateway, refusal, simulat
 HOUSE = Path(__file__).resolve().parents[2]
 
 
-def test_a_frozen_controller_is_silent_within_a_second_and_reconnected(mesh, tmp_path):
-    async def main():
-        async with faulty_site(mesh, tmp_path) as (site, fault):
-            await fault("freeze")
-            begin_s = time.monotonic()
-            await until(lambda: site.controller.link == STATE.SILENT)
-            # 1 s after the last unit, and a margin for a busy machine.
-            assert time.monotonic() - begin_s < 1.0 + 1.5
-            assert "sends nothing" in (await site.event("link.silent", -1)).text
-            joints = len(site.seen["joints"])
-            await until(lambda: site.controller.link == STATE.DOWN)
-            assert site.controller.capabilities.stops == schema.Capabilities.NOT_NOW
-            assert "sends nothing; connecting again" in (await site.event("link.down", -1)).text
-            assert len(site.seen["joints"]) == joints
-            await fault("freeze", off=True)
-            await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
-
-    run(main())
+async def test_a_frozen_controller_is_silent_within_a_second_and_reconnected(mesh, tmp_path):
+    async with faulty_site(mesh, tmp_path) as (site, fault):
+        await fault("freeze")
+        begin_s = time.monotonic()
+        await until(lambda: site.controller.link == STATE.SILENT)
+        # 1 s after the last unit, and a margin for a busy machine.
+        assert time.monotonic() - begin_s < 1.0 + 1.5
+        assert "sends nothing" in (await site.event("link.silent", -1)).text
+        joints = len(site.seen["joints"])
+        await until(lambda: site.controller.link == STATE.DOWN)
+        assert site.controller.capabilities.stops == schema.Capabilities.NOT_NOW
+        assert "sends nothing; connecting again" in (await site.event("link.down", -1)).text
+        assert len(site.seen["joints"]) == joints
+        await fault("freeze", off=True)
+        await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
 
 
-def test_a_controller_that_drops_connections_is_reconnected(mesh, tmp_path):
-    async def main():
-        async with faulty_site(mesh, tmp_path) as (site, fault):
-            await fault("drop")
-            await until(lambda: site.controller.counters.connections >= 3, timeout_s=40.0)
-            assert "the controller closed the connection" in (await site.event("link.down", -1)).text
-            await fault("drop", off=True)
-            await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
-            before = len(site.seen["joints"])
-            await until(lambda: len(site.seen["joints"]) > before + 20)
-
-    run(main())
+async def test_a_controller_that_drops_connections_is_reconnected(mesh, tmp_path):
+    async with faulty_site(mesh, tmp_path) as (site, fault):
+        await fault("drop")
+        await until(lambda: site.controller.counters.connections >= 3, timeout_s=40.0)
+        assert "the controller closed the connection" in (await site.event("link.down", -1)).text
+        await fault("drop", off=True)
+        await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
+        before = len(site.seen["joints"])
+        await until(lambda: len(site.seen["joints"]) > before + 20)
 
 
-def test_a_controller_that_restarts_comes_back_and_is_not_taken_for_homed(mesh, tmp_path):
-    async def main():
-        async with faulty_site(mesh, tmp_path) as (site, fault):
-            await until(lambda: site.controller.homed == STATE.YES)
-            await fault("restart")
-            await until(lambda: site.events("link.down"))
-            await until(lambda: site.controller.link == STATE.UP and site.controller.homed == STATE.NO)
-            assert site.controller.controller_time_s < 10.0
-
-    run(main())
+async def test_a_controller_that_restarts_comes_back_and_is_not_taken_for_homed(mesh, tmp_path):
+    async with faulty_site(mesh, tmp_path) as (site, fault):
+        await until(lambda: site.controller.homed == STATE.YES)
+        await fault("restart")
+        await until(lambda: site.events("link.down"))
+        await until(lambda: site.controller.link == STATE.UP and site.controller.homed == STATE.NO)
+        assert site.controller.controller_time_s < 10.0
 
 
-def test_a_controller_that_refuses_connections_is_reported_with_its_text(mesh, tmp_path):
-    async def main():
-        async with faulty_site(mesh, tmp_path) as (site, fault):
-            await fault("refuse")
-            await until(lambda: "refused the connection: too many clients" in site.controller.link_text)
-            assert site.controller.link == STATE.DOWN
-            await until(lambda: site.events("link.down"))
-            await fault("refuse", off=True)
-            await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
-
-    run(main())
+async def test_a_controller_that_refuses_connections_is_reported_with_its_text(mesh, tmp_path):
+    async with faulty_site(mesh, tmp_path) as (site, fault):
+        await fault("refuse")
+        await until(lambda: "refused the connection: too many clients" in site.controller.link_text)
+        assert site.controller.link == STATE.DOWN
+        await until(lambda: site.events("link.down"))
+        await fault("refuse", off=True)
+        await until(lambda: site.controller.link == STATE.UP, timeout_s=40.0)
 
 
-def test_an_unknown_fault_is_refused_with_the_known_ones(mesh, tmp_path):
-    async def main():
-        async with faulty_site(mesh, tmp_path) as (site, fault):
-            assert "'melt' is unknown; there are freeze, " in await refusal(fault("melt"))
-            assert "both in seconds" in await refusal(fault("freeze@-1"))
-            answer = await fault("split+60")
-            assert list(answer.active) == ["split"]
-            assert {"freeze", "garbage", "flood", "jump", "local"} < set(answer.known)
-            assert list((await fault("split", off=True)).active) == []
-            assert site.controller.link == STATE.UP
-
-    run(main())
+async def test_an_unknown_fault_is_refused_with_the_known_ones(mesh, tmp_path):
+    async with faulty_site(mesh, tmp_path) as (site, fault):
+        assert "'melt' is unknown; there are freeze, " in await refusal(fault("melt"))
+        assert "both in seconds" in await refusal(fault("freeze@-1"))
+        answer = await fault("split+60")
+        assert list(answer.active) == ["split"]
+        assert {"freeze", "garbage", "flood", "jump", "local"} < set(answer.known)
+        assert list((await fault("split", off=True)).active) == []
+        assert site.controller.link == STATE.UP
 
 
-def test_a_simulator_serves_without_a_router(mesh, tmp_path):
-    async def main():
-        nowhere = SessionSettings(connect=("tcp/127.0.0.1:9",))
-        own = Mesh(site="hall", robot="arm", session=nowhere)
-        async with simulator(mesh=own) as port, gateway(mesh, tmp_path, port) as site:
-            assert site.controller.link == STATE.UP
-
-    run(main())
+async def test_a_simulator_serves_without_a_router(mesh, tmp_path):
+    nowhere = SessionSettings(connect=("tcp/127.0.0.1:9",))
+    own = Mesh(site="hall", robot="arm", session=nowhere)
+    async with simulator(mesh=own) as port, gateway(mesh, tmp_path, port) as site:
+        assert site.controller.link == STATE.UP
 
 
 # --------------------------------------------------------------------- a host that has vanished

@@ -23,7 +23,7 @@ from protocol_gateway.seam import (
 from protocol_gateway.seam.errors import LinkDownError, NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.service.loop_turns import LONG_S, MeasuredLoop, turns_of
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 from tests.protocol_gateway.scripted_controller import endless_joints
 from tests.protocol_gateway.test_link import Seen, controller, end, until
 
@@ -129,18 +129,15 @@ def polling(**effects):
     return Driver(**asked | effects)
 
 
-def test_a_driver_asks_over_udp_by_its_timer():
-    async def main():
-        driver = polling()
-        async with peer() as arm, link(driver, arm.port) as (arm_link, seen):
-            await until(lambda: len(seen.events) >= 20)
-            assert arm_link.status.state is LinkState.UP
-            assert arm_link.counters.units_sent >= 20
-            assert ("received", "polled", b"?") in driver.told
-        assert driver.told[0] == ("started",)
-        assert driver.told[1] == ("opened", "polled")
-
-    run(main())
+async def test_a_driver_asks_over_udp_by_its_timer():
+    driver = polling()
+    async with peer() as arm, link(driver, arm.port) as (arm_link, seen):
+        await until(lambda: len(seen.events) >= 20)
+        assert arm_link.status.state is LinkState.UP
+        assert arm_link.counters.units_sent >= 20
+        assert ("received", "polled", b"?") in driver.told
+    assert driver.told[0] == ("started",)
+    assert driver.told[1] == ("opened", "polled")
 
 
 def test_link_whose_driver_takes_long_is_what_ran_in_a_long_turn():
@@ -158,226 +155,190 @@ def test_link_whose_driver_takes_long_is_what_ran_in_a_long_turn():
         runner.run(main())
 
 
-def test_datagrams_of_another_sender_are_not_read():
-    async def main():
-        driver = polling()
-        async with peer() as arm, peer() as other, link(driver, arm.port) as (_, seen):
-            await until(lambda: seen.events)
-            for _ in range(20):
-                other.transport.sendto(b"from elsewhere", arm.asker)
-                await asyncio.sleep(0.01)
-            assert {told[2] for told in driver.told if told[0] == "received"} == {b"?"}
-
-    run(main())
+async def test_datagrams_of_another_sender_are_not_read():
+    driver = polling()
+    async with peer() as arm, peer() as other, link(driver, arm.port) as (_, seen):
+        await until(lambda: seen.events)
+        for _ in range(20):
+            other.transport.sendto(b"from elsewhere", arm.asker)
+            await asyncio.sleep(0.01)
+        assert {told[2] for told in driver.told if told[0] == "received"} == {b"?"}
 
 
-def test_a_udp_port_that_nobody_has_is_down_and_comes_back():
-    async def main():
-        async with peer() as arm:
-            port = arm.port
-        async with link(polling(), port, reconnect_after_s=1.0) as (arm_link, seen):
-            await until(lambda: LinkState.SILENT in seen.states and seen.states[-1] is LinkState.DOWN)
-            assert "refused" in arm_link.status.text
-            async with peer(port):
-                await until(lambda: arm_link.status.state is LinkState.UP)
-
-    run(main())
+async def test_a_udp_port_that_nobody_has_is_down_and_comes_back():
+    async with peer() as arm:
+        port = arm.port
+    async with link(polling(), port, reconnect_after_s=1.0) as (arm_link, seen):
+        await until(lambda: LinkState.SILENT in seen.states and seen.states[-1] is LinkState.DOWN)
+        assert "refused" in arm_link.status.text
+        async with peer(port):
+            await until(lambda: arm_link.status.state is LinkState.UP)
 
 
-def test_a_driver_sends_no_more_questions_than_it_declares(caplog):
-    async def main():
-        driver = polling(timer_ended=lambda now_s: (Send(POLLED, b"?"),) * 50 + (SetTimer(now_s + EVERY_S),))
-        async with peer() as arm, link(driver, arm.port):
-            await until(lambda: arm.questions)
-            before = len(arm.questions)
-            await asyncio.sleep(1.0)
-            # 2,500 were wanted. A late timer gives no more than what a second holds.
-            assert len(arm.questions) - before <= 2.5 * driver.requests_a_second
-        assert "more questions than it declares" in caplog.text
-
-    run(main())
+async def test_a_driver_sends_no_more_questions_than_it_declares(caplog):
+    driver = polling(timer_ended=lambda now_s: (Send(POLLED, b"?"),) * 50 + (SetTimer(now_s + EVERY_S),))
+    async with peer() as arm, link(driver, arm.port):
+        await until(lambda: arm.questions)
+        before = len(arm.questions)
+        await asyncio.sleep(1.0)
+        # 2,500 were wanted. A late timer gives no more than what a second holds.
+        assert len(arm.questions) - before <= 2.5 * driver.requests_a_second
+    assert "more questions than it declares" in caplog.text
 
 
-def test_a_lost_stop_channel_is_no_lost_link_and_refuses_only_what_it_carries():
-    async def main():
-        async with controller() as reads, controller() as stops:
-            driver = Driver(
-                started=(Open(READ), Open(STOP, port=stops.port)),
-                received=(STATE,),
-                command=(Send(STOP, b"stop"),),
-            )
-            async with link(driver, reads.port) as (arm_link, seen):
-                _, read_writer = await reads.next()
-                reader, writer = await stops.next()
-                read_writer.write(b"state")
-                await until(lambda: arm_link.status.state is LinkState.UP)
+async def test_a_lost_stop_channel_is_no_lost_link_and_refuses_only_what_it_carries():
+    async with controller() as reads, controller() as stops:
+        driver = Driver(
+            started=(Open(READ), Open(STOP, port=stops.port)),
+            received=(STATE,),
+            command=(Send(STOP, b"stop"),),
+        )
+        async with link(driver, reads.port) as (arm_link, seen):
+            _, read_writer = await reads.next()
+            reader, writer = await stops.next()
+            read_writer.write(b"state")
+            await until(lambda: arm_link.status.state is LinkState.UP)
+            arm_link.send(b"stop")
+            assert await reader.readexactly(4) == b"stop"
+            await end(writer)
+            await until(lambda: ("closed", "stop") in driver.told)
+            assert arm_link.status.state is LinkState.UP
+            assert seen.states == [LinkState.SILENT, LinkState.UP]
+            with pytest.raises(LinkDownError):
                 arm_link.send(b"stop")
-                assert await reader.readexactly(4) == b"stop"
-                await end(writer)
-                await until(lambda: ("closed", "stop") in driver.told)
-                assert arm_link.status.state is LinkState.UP
-                assert seen.states == [LinkState.SILENT, LinkState.UP]
-                with pytest.raises(LinkDownError):
-                    arm_link.send(b"stop")
-                # It connects again without a command, immediately after a failed stop.
-                reader, writer = await stops.next()
-                await until(lambda: driver.told.count(("opened", "stop")) == 2)
-                arm_link.send(b"stop")
-                assert await reader.readexactly(4) == b"stop"
-                await end(writer)
-                await end(read_writer)
-
-    run(main())
+            # It connects again without a command, immediately after a failed stop.
+            reader, writer = await stops.next()
+            await until(lambda: driver.told.count(("opened", "stop")) == 2)
+            arm_link.send(b"stop")
+            assert await reader.readexactly(4) == b"stop"
+            await end(writer)
+            await end(read_writer)
 
 
 @pytest.mark.parametrize(
     ("alternative", "ways", "arrives"),
     [(True, "nowhere read", True), (False, "nowhere read", False), (True, "nowhere nowhere", False)],
 )
-def test_a_command_with_two_ways_needs_one_of_them(alternative, ways, arrives):
-    async def main():
-        async with controller() as reads:
-            channels = {"read": READ, "nowhere": Channel(name="nowhere", carries=Carries.STOP)}
-            driver = Driver(
-                started=(Open(READ), Open(channels["nowhere"], port=free_port())),
-                command=lambda encoded: [
-                    Send(channels[name], encoded, alternative=alternative) for name in ways.split()
-                ],
-            )
-            async with link(driver, reads.port) as (arm_link, _):
-                reader, writer = await reads.next()
-                await until(lambda: ("opened", "read") in driver.told)
-                if arrives:
+async def test_a_command_with_two_ways_needs_one_of_them(alternative, ways, arrives):
+    async with controller() as reads:
+        channels = {"read": READ, "nowhere": Channel(name="nowhere", carries=Carries.STOP)}
+        driver = Driver(
+            started=(Open(READ), Open(channels["nowhere"], port=free_port())),
+            command=lambda encoded: [
+                Send(channels[name], encoded, alternative=alternative) for name in ways.split()
+            ],
+        )
+        async with link(driver, reads.port) as (arm_link, _):
+            reader, writer = await reads.next()
+            await until(lambda: ("opened", "read") in driver.told)
+            if arrives:
+                arm_link.send(b"stop")
+                assert await reader.readexactly(4) == b"stop"
+            else:
+                with pytest.raises(LinkDownError):
                     arm_link.send(b"stop")
-                    assert await reader.readexactly(4) == b"stop"
-                else:
-                    with pytest.raises(LinkDownError):
-                        arm_link.send(b"stop")
-                await end(writer)
-
-    run(main())
+            await end(writer)
 
 
-def test_a_driver_refuses_a_command_and_reports_an_unknown_fate():
+async def test_a_driver_refuses_a_command_and_reports_an_unknown_fate():
     def not_now(encoded):
         raise NotReadyError(codes.OTHER(detail="a motion still runs"))
 
-    async def main():
-        async with controller() as reads:
-            why = codes.OTHER(detail="its program was paused")
-            driver = Driver(started=(Open(READ),), command=not_now, received=(STATE, FateUnknown(why)))
-            async with link(driver, reads.port) as (arm_link, seen):
-                _, writer = await reads.next()
-                with pytest.raises(NotReadyError, match="still runs"):
-                    arm_link.send(b"move")
-                writer.write(b"state")
-                await until(lambda: seen.fates == [why])
-                assert arm_link.counters.units_sent == 0
-                await end(writer)
-
-    run(main())
+    async with controller() as reads:
+        why = codes.OTHER(detail="its program was paused")
+        driver = Driver(started=(Open(READ),), command=not_now, received=(STATE, FateUnknown(why)))
+        async with link(driver, reads.port) as (arm_link, seen):
+            _, writer = await reads.next()
+            with pytest.raises(NotReadyError, match="still runs"):
+                arm_link.send(b"move")
+            writer.write(b"state")
+            await until(lambda: seen.fates == [why])
+            assert arm_link.counters.units_sent == 0
+            await end(writer)
 
 
-def test_what_ends_a_motion_is_sent_however_many_questions_were_sent():
-    async def main():
-        async with controller() as reads:
-            effects = (Send(READ, b"end"), FateUnknown(codes.OTHER(detail="its program was paused")))
-            driver = Driver(started=(Open(READ),), received=effects)
-            driver.requests_a_second = 0.0
-            async with link(driver, reads.port) as (_, seen):
-                reader, writer = await reads.next()
-                writer.write(b"state")
-                assert await reader.readexactly(3) == b"end"
-                assert len(seen.fates) == 1
-                await end(writer)
-
-    run(main())
+async def test_what_ends_a_motion_is_sent_however_many_questions_were_sent():
+    async with controller() as reads:
+        effects = (Send(READ, b"end"), FateUnknown(codes.OTHER(detail="its program was paused")))
+        driver = Driver(started=(Open(READ),), received=effects)
+        driver.requests_a_second = 0.0
+        async with link(driver, reads.port) as (_, seen):
+            reader, writer = await reads.next()
+            writer.write(b"state")
+            assert await reader.readexactly(3) == b"end"
+            assert len(seen.fates) == 1
+            await end(writer)
 
 
-def test_a_driver_moves_a_channel_to_another_port():
-    async def main():
-        async with controller() as first, controller() as second:
-            driver = Driver(
-                started=(Open(READ),),
-                received=lambda channel, data: (
-                    (Open(READ, port=second.port),) if data == b"elsewhere" else (STATE,)
-                ),
-            )
-            async with link(driver, first.port) as (arm_link, _):
-                _, writer = await first.next()
-                writer.write(b"elsewhere")
-                _, other = await second.next()
-                other.write(b"state")
-                await until(lambda: arm_link.status.state is LinkState.UP)
-                await end(other)
-                await end(writer)
-
-    run(main())
+async def test_a_driver_moves_a_channel_to_another_port():
+    async with controller() as first, controller() as second:
+        driver = Driver(
+            started=(Open(READ),),
+            received=lambda channel, data: (
+                (Open(READ, port=second.port),) if data == b"elsewhere" else (STATE,)
+            ),
+        )
+        async with link(driver, first.port) as (arm_link, _):
+            _, writer = await first.next()
+            writer.write(b"elsewhere")
+            _, other = await second.next()
+            other.write(b"state")
+            await until(lambda: arm_link.status.state is LinkState.UP)
+            await end(other)
+            await end(writer)
 
 
-def test_a_closed_channel_is_not_connected_again():
-    async def main():
-        async with controller() as arm:
-            driver = Driver(started=(Open(READ),), received=lambda channel, data: (STATE, Close(READ)))
-            async with link(driver, arm.port) as (_, seen):
-                _, writer = await arm.next()
-                writer.write(b"state")
-                await until(lambda: LinkState.UP in seen.states and seen.states[-1] is LinkState.DOWN)
-                await asyncio.sleep(0.6)
-                assert arm.connections.empty()
-                await end(writer)
-
-    run(main())
-
-
-def test_a_command_before_the_link_runs_is_refused_and_makes_it_connect_without_long_pauses():
-    async def main():
-        driver = Driver(started=(Open(READ),), command=(Send(READ, b"stop"),))
-        settings = LinkSettings(host="127.0.0.1", port=free_port())
-        arm_link = ControllerLink(settings, driver, endless_joints(2), on_event=Seen().event)
-        with pytest.raises(LinkDownError):
-            arm_link.send(b"stop")
-        task = asyncio.create_task(arm_link.run())
-        begin = time.monotonic()
-        await until(lambda: driver.told.count(("closed", "read")) >= 8)
-        # With pauses that grow it would take 25 s.
-        assert time.monotonic() - begin < 15.0
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-
-    run(main())
-
-
-def test_pauses_between_failed_attempts_grow_also_after_a_connection_of_use():
-    async def main():
-        driver = Driver(started=(Open(READ),), received=(STATE,))
-        async with controller() as arm, link(driver, arm.port) as (arm_link, _):
+async def test_a_closed_channel_is_not_connected_again():
+    async with controller() as arm:
+        driver = Driver(started=(Open(READ),), received=lambda channel, data: (STATE, Close(READ)))
+        async with link(driver, arm.port) as (_, seen):
             _, writer = await arm.next()
             writer.write(b"state")
-            await until(lambda: arm_link.status.state is LinkState.UP)
-            arm.server.close()
+            await until(lambda: LinkState.UP in seen.states and seen.states[-1] is LinkState.DOWN)
+            await asyncio.sleep(0.6)
+            assert arm.connections.empty()
             await end(writer)
-            await asyncio.sleep(4.0)
-            # At 0, 0.2, 0.6, 1.4 and 3.0 s, a fifth earlier or later; with short pauses it would be 20.
-            assert 1 <= driver.told.count(("closed", "read")) <= 7
-
-    run(main())
 
 
-def test_an_exception_at_a_timer_ends_the_link():
-    async def main():
-        def broken(now_s):
-            raise ZeroDivisionError
+async def test_a_command_before_the_link_runs_is_refused_and_makes_it_connect_without_long_pauses():
+    driver = Driver(started=(Open(READ),), command=(Send(READ, b"stop"),))
+    settings = LinkSettings(host="127.0.0.1", port=free_port())
+    arm_link = ControllerLink(settings, driver, endless_joints(2), on_event=Seen().event)
+    with pytest.raises(LinkDownError):
+        arm_link.send(b"stop")
+    task = asyncio.create_task(arm_link.run())
+    begin = time.monotonic()
+    await until(lambda: driver.told.count(("closed", "read")) >= 8)
+    # With pauses that grow it would take 25 s.
+    assert time.monotonic() - begin < 15.0
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
 
-        async with peer() as arm:
-            settings = LinkSettings(host="127.0.0.1", port=arm.port)
-            arm_link = ControllerLink(
-                settings, polling(timer_ended=broken), endless_joints(2), on_event=Seen().event
-            )
-            with pytest.raises(ZeroDivisionError):
-                await arm_link.run()
 
-    run(main())
+async def test_pauses_between_failed_attempts_grow_also_after_a_connection_of_use():
+    driver = Driver(started=(Open(READ),), received=(STATE,))
+    async with controller() as arm, link(driver, arm.port) as (arm_link, _):
+        _, writer = await arm.next()
+        writer.write(b"state")
+        await until(lambda: arm_link.status.state is LinkState.UP)
+        arm.server.close()
+        await end(writer)
+        await asyncio.sleep(4.0)
+        # At 0, 0.2, 0.6, 1.4 and 3.0 s, a fifth earlier or later; with short pauses it would be 20.
+        assert 1 <= driver.told.count(("closed", "read")) <= 7
+
+
+async def test_an_exception_at_a_timer_ends_the_link():
+    def broken(now_s):
+        raise ZeroDivisionError
+
+    async with peer() as arm:
+        settings = LinkSettings(host="127.0.0.1", port=arm.port)
+        arm_link = ControllerLink(
+            settings, polling(timer_ended=broken), endless_joints(2), on_event=Seen().event
+        )
+        with pytest.raises(ZeroDivisionError):
+            await arm_link.run()
 
 
 class Follower(Driver):
@@ -392,20 +353,17 @@ class Follower(Driver):
         return (Open(POLLED) if taken else Close(POLLED),)
 
 
-def test_a_driver_may_follow_who_controls_the_robot():
-    async def main():
-        async with peer() as controller:
-            driver = Follower(started=(), opened=lambda channel: (Send(POLLED, b"?"),))
-            async with link(driver, controller.port) as (arm_link, _):
-                await until(lambda: driver.controls == [False])
-                arm_link.controlled(True)
-                await until(lambda: controller.questions)
-                assert arm_link.carries(POLLED.carries)
-                arm_link.controlled(False)
-                assert not arm_link.carries(POLLED.carries)
-                assert driver.controls == [False, True, False]
-            # A driver without the method is not told.
-            async with link(polling(), controller.port) as (arm_link, _):
-                arm_link.controlled(True)
-
-    run(main())
+async def test_a_driver_may_follow_who_controls_the_robot():
+    async with peer() as controller:
+        driver = Follower(started=(), opened=lambda channel: (Send(POLLED, b"?"),))
+        async with link(driver, controller.port) as (arm_link, _):
+            await until(lambda: driver.controls == [False])
+            arm_link.controlled(True)
+            await until(lambda: controller.questions)
+            assert arm_link.carries(POLLED.carries)
+            arm_link.controlled(False)
+            assert not arm_link.carries(POLLED.carries)
+            assert driver.controls == [False, True, False]
+        # A driver without the method is not told.
+        async with link(polling(), controller.port) as (arm_link, _):
+            arm_link.controlled(True)

@@ -140,61 +140,55 @@ async def flooding(say):
         await asyncio.gather(task, return_exceptions=True)
 
 
-def test_a_single_status_in_a_flood_is_used_and_relayed(mesh, tmp_path):
-    async def main():
-        settings = legacy(commanders={})
-        async with (
-            scripted_controller() as (port, say, heard),
-            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
-        ):
-            await until(lambda: site.controller.link == STATE.SILENT)
-            say("1#STATUS*idle;remote;homed@" + UNIT % 1.0)
-            await until(lambda: site.controller.mode == STATE.REMOTE)
-            async with program(settings) as old, flooding(say):
-                await until(lambda: site.controller.health.flooding)
-                await site.lease(A.ACQUIRE, ttl_s=5)
-                for mode, known in (("local", STATE.LOCAL), ("remote", STATE.REMOTE)) * 3:
-                    say(UNIT % 1.0 * 3 + f"1#STATUS*idle;{mode};homed@" + UNIT % 1.0 * 3)
-                    await until(lambda known=known: site.controller.mode == known)
-                    await until(lambda mode=mode: mode in old.words)
-                say("1#STATUS*idle;local;homed@1#STATUS*idle;remote;homed@" + UNIT % 1.0)
-                await until(lambda: len(site.events("controller.local")) == 4)  # even a single one
-                say("1#STATUS*idle;local;homed@" + UNIT % 1.0)
-                await until(lambda: len(site.events("controller.local")) == 5)
-                move = site.command(C.MOVE_ABSOLUTE, joint_positions=[0.1, 0, 0, 0, 0])
-                assert "local mode" in await refusal(move)
-            assert b"ABSOLUTE" not in heard
-
-    run(main())
+async def test_a_single_status_in_a_flood_is_used_and_relayed(mesh, tmp_path):
+    settings = legacy(commanders={})
+    async with (
+        scripted_controller() as (port, say, heard),
+        gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
+    ):
+        await until(lambda: site.controller.link == STATE.SILENT)
+        say("1#STATUS*idle;remote;homed@" + UNIT % 1.0)
+        await until(lambda: site.controller.mode == STATE.REMOTE)
+        async with program(settings) as old, flooding(say):
+            await until(lambda: site.controller.health.flooding)
+            await site.lease(A.ACQUIRE, ttl_s=5)
+            for mode, known in (("local", STATE.LOCAL), ("remote", STATE.REMOTE)) * 3:
+                say(UNIT % 1.0 * 3 + f"1#STATUS*idle;{mode};homed@" + UNIT % 1.0 * 3)
+                await until(lambda known=known: site.controller.mode == known)
+                await until(lambda mode=mode: mode in old.words)
+            say("1#STATUS*idle;local;homed@1#STATUS*idle;remote;homed@" + UNIT % 1.0)
+            await until(lambda: len(site.events("controller.local")) == 4)  # even a single one
+            say("1#STATUS*idle;local;homed@" + UNIT % 1.0)
+            await until(lambda: len(site.events("controller.local")) == 5)
+            move = site.command(C.MOVE_ABSOLUTE, joint_positions=[0.1, 0, 0, 0, 0])
+            assert "local mode" in await refusal(move)
+        assert b"ABSOLUTE" not in heard
 
 
-def test_of_a_flood_the_newest_is_published_200_times_a_second(mesh, tmp_path):
-    async def main():
-        settings = legacy(commanders={})
-        async with (
-            scripted_controller() as (port, say, _),
-            gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
-        ):
-            await until(lambda: site.controller.link == STATE.SILENT)
-            async with program(settings) as old, flooding(say):
-                await until(lambda: site.controller.health.flooding)
-                rates: tuple[list[float], list[float]] = ([], [])
-                for _ in range(5):
-                    before, units_before, begin_s = len(site.seen["joints"]), len(old.units), time.monotonic()
-                    await asyncio.sleep(0.5)
-                    elapsed_s = time.monotonic() - begin_s
-                    rates[0].append((len(site.seen["joints"]) - before) / elapsed_s)
-                    rates[1].append((len(old.units) - units_before) / elapsed_s)
-                # A busy machine may read data in the half second after their sending.
-                for each in rates:
-                    assert max(each) > 0
-                    assert min(each) < 250
-            assert site.controller.counters.units_skipped > 1000
-            # The last state of a flood is published, too.
-            say(UNIT % 2.0)
-            await until(lambda: site.joints[0] == pytest.approx(math.radians(2.0)))
-
-    run(main())
+async def test_of_a_flood_the_newest_is_published_200_times_a_second(mesh, tmp_path):
+    settings = legacy(commanders={})
+    async with (
+        scripted_controller() as (port, say, _),
+        gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
+    ):
+        await until(lambda: site.controller.link == STATE.SILENT)
+        async with program(settings) as old, flooding(say):
+            await until(lambda: site.controller.health.flooding)
+            rates: tuple[list[float], list[float]] = ([], [])
+            for _ in range(5):
+                before, units_before, begin_s = len(site.seen["joints"]), len(old.units), time.monotonic()
+                await asyncio.sleep(0.5)
+                elapsed_s = time.monotonic() - begin_s
+                rates[0].append((len(site.seen["joints"]) - before) / elapsed_s)
+                rates[1].append((len(old.units) - units_before) / elapsed_s)
+            # A busy machine may read data in the half second after their sending.
+            for each in rates:
+                assert max(each) > 0
+                assert min(each) < 250
+        assert site.controller.counters.units_skipped > 1000
+        # The last state of a flood is published, too.
+        say(UNIT % 2.0)
+        await until(lambda: site.joints[0] == pytest.approx(math.radians(2.0)))
 
 
 @contextlib.asynccontextmanager
@@ -271,42 +265,36 @@ def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):
     run(main(), timeout_s=180.0)
 
 
-def test_of_undated_delayed_units_only_the_newest_is_published(mesh, tmp_path):
-    async def main():
-        async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
-            await until(lambda: site.controller.link == STATE.SILENT)
-            for first in (1.0, 2.0):
-                say(UNIT % first)
-                await until(lambda: site.seen["joints"])
-                await until(lambda first=first: site.joints[0] == pytest.approx(math.radians(first)))
-                before = len(site.seen["joints"])
-                await asyncio.sleep(0.5)
-                skipped = site.controller.counters.units_skipped + 198
-                for begin in (10, 110):  # in two pieces, as networks do
-                    say("".join(UNIT % (0.05 * (begin + number)) for number in range(100)))
-                await until(lambda: site.joints[0] == pytest.approx(math.radians(10.45)))
-                assert len(site.seen["joints"]) - before <= 2
-                await until(lambda skipped=skipped: site.controller.counters.units_skipped >= skipped)
-
-    run(main())
-
-
-def test_live_positions_after_a_gap_are_all_published(mesh, tmp_path):
-    async def main():
-        waist = 0
-
-        def state():
-            nonlocal waist
-            waist += 1
-            return UNIT % (0.1 * waist)
-
-        async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
-            await until(lambda: site.controller.link == STATE.SILENT)
-            say(state())
+async def test_of_undated_delayed_units_only_the_newest_is_published(mesh, tmp_path):
+    async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
+        await until(lambda: site.controller.link == STATE.SILENT)
+        for first in (1.0, 2.0):
+            say(UNIT % first)
+            await until(lambda: site.seen["joints"])
+            await until(lambda first=first: site.joints[0] == pytest.approx(math.radians(first)))
+            before = len(site.seen["joints"])
             await asyncio.sleep(0.5)
-            async with repeated(say, state):
-                await until(lambda: len(site.seen["joints"]) > 60)
-            # Two units in one read are a burst, on a busy machine.
-            assert len(site.seen["joints"]) > 0.7 * waist
+            skipped = site.controller.counters.units_skipped + 198
+            for begin in (10, 110):  # in two pieces, as networks do
+                say("".join(UNIT % (0.05 * (begin + number)) for number in range(100)))
+            await until(lambda: site.joints[0] == pytest.approx(math.radians(10.45)))
+            assert len(site.seen["joints"]) - before <= 2
+            await until(lambda skipped=skipped: site.controller.counters.units_skipped >= skipped)
 
-    run(main())
+
+async def test_live_positions_after_a_gap_are_all_published(mesh, tmp_path):
+    waist = 0
+
+    def state():
+        nonlocal waist
+        waist += 1
+        return UNIT % (0.1 * waist)
+
+    async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
+        await until(lambda: site.controller.link == STATE.SILENT)
+        say(state())
+        await asyncio.sleep(0.5)
+        async with repeated(say, state):
+            await until(lambda: len(site.seen["joints"]) > 60)
+        # Two units in one read are a burst, on a busy machine.
+        assert len(site.seen["joints"]) > 0.7 * waist

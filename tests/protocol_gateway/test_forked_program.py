@@ -9,7 +9,6 @@ import sys
 import psutil
 import pytest
 
-from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, gateway, simulator, until
 from tests.robomesh.forking_script import WAYS
 
@@ -38,38 +37,32 @@ def children(lines):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("way", [way for way in WAYS if way != "use"])
-def test_a_killed_program_loses_control_at_once_while_its_child_lives(mesh, tmp_path, way):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port) as site,
-            program(site, mesh, tmp_path, way) as (process, lines),
-        ):
-            await until(lambda: site.controller.activity == STATE.MOVING, timeout_s=60.0)
-            await until(lambda: way == "none" or children(lines()), timeout_s=60.0)
-            process.send_signal(signal.SIGKILL)
-            await until(lambda: site.controller.HasField("stop"))
-            # Its lease did not expire.
-            assert site.controller.stop.reason == "dead-man: script's page or program has disconnected"
-            # Without a copy of the connection, its end is seen at once. The child still lives.
-            for pid in children(lines()):
-                ends = [each.raddr.port for each in psutil.Process(pid).net_connections() if each.raddr]
-                assert int(mesh.connect[0].rpartition(":")[2]) not in ends
-
-    run(main())
+async def test_a_killed_program_loses_control_at_once_while_its_child_lives(mesh, tmp_path, way):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port) as site,
+        program(site, mesh, tmp_path, way) as (process, lines),
+    ):
+        await until(lambda: site.controller.activity == STATE.MOVING, timeout_s=60.0)
+        await until(lambda: way == "none" or children(lines()), timeout_s=60.0)
+        process.send_signal(signal.SIGKILL)
+        await until(lambda: site.controller.HasField("stop"))
+        # Its lease did not expire.
+        assert site.controller.stop.reason == "dead-man: script's page or program has disconnected"
+        # Without a copy of the connection, its end is seen at once. The child still lives.
+        for pid in children(lines()):
+            ends = [each.raddr.port for each in psutil.Process(pid).net_connections() if each.raddr]
+            assert int(mesh.connect[0].rpartition(":")[2]) not in ends
 
 
 @pytest.mark.slow
-def test_a_forked_process_cannot_use_what_it_inherited_and_its_parent_can(mesh, tmp_path):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port) as site,
-            program(site, mesh, tmp_path, "use") as (process, lines),
-        ):
-            assert await process.wait() == 0
-            calls = ("stop", "home", "robots", "__next__")
-            assert lines() == [*(f"{call} -> ForkedError" for call in calls), "exit status 7", "arrived"]
-            assert not site.controller.HasField("stop")
-
-    run(main())
+async def test_a_forked_process_cannot_use_what_it_inherited_and_its_parent_can(mesh, tmp_path):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port) as site,
+        program(site, mesh, tmp_path, "use") as (process, lines),
+    ):
+        assert await process.wait() == 0
+        calls = ("stop", "home", "robots", "__next__")
+        assert lines() == [*(f"{call} -> ForkedError" for call in calls), "exit status 7", "arrived"]
+        assert not site.controller.HasField("stop")

@@ -201,7 +201,7 @@ def test_a_sync_that_hangs_does_not_block_newer_stops(path, monkeypatch):
     latch.close()
 
 
-def test_a_stop_only_in_the_latch_file_is_restored_and_audited(tmp_path):
+async def test_a_stop_only_in_the_latch_file_is_restored_and_audited(tmp_path):
     log = tmp_path / "arm.jsonl"
 
     async def life(*, latched=None, kill=False):
@@ -215,23 +215,20 @@ def test_a_stop_only_in_the_latch_file_is_restored_and_audited(tmp_path):
         await audit.close()
         return found
 
-    async def main():
-        await life(latched=stop(1, "dog"), kill=True)
-        memory, mended = await life()
-        assert (memory.stop.id, memory.stop.by, memory.stop.reason) == (1, "wang", "dog")
-        assert memory.last_stop_id == 1 + RESERVED
-        assert mended == ""
-        (entry,) = read_entries(log)
-        assert (entry.request, entry.operator, entry.values["stop_id"]) == ("STOP", "wang", "1")
-        assert entry.text == "the gateway was killed before it wrote the entry of stop 1"
-        memory, _ = await life()
-        assert memory.stop.id == 1
-        assert len(list(read_entries(log))) == 1
-
-    run(main())
+    await life(latched=stop(1, "dog"), kill=True)
+    memory, mended = await life()
+    assert (memory.stop.id, memory.stop.by, memory.stop.reason) == (1, "wang", "dog")
+    assert memory.last_stop_id == 1 + RESERVED
+    assert mended == ""
+    (entry,) = read_entries(log)
+    assert (entry.request, entry.operator, entry.values["stop_id"]) == ("STOP", "wang", "1")
+    assert entry.text == "the gateway was killed before it wrote the entry of stop 1"
+    memory, _ = await life()
+    assert memory.stop.id == 1
+    assert len(list(read_entries(log))) == 1
 
 
-def test_a_stop_with_an_unsent_reset_stays_latched(tmp_path):
+async def test_a_stop_with_an_unsent_reset_stays_latched(tmp_path):
     log = tmp_path / "arm.jsonl"
 
     async def life(*requests, latched=None):
@@ -255,19 +252,16 @@ def test_a_stop_with_an_unsent_reset_stays_latched(tmp_path):
         await audit.close()
         return found
 
-    async def main():
-        await life("STOP", "RESET", latched=stop(1))
-        for _ in range(2):
-            memory = await life()
-            assert (memory.stop.id, memory.stop.by) == (1, "wang")
-        *_, entry = read_entries(log)
-        assert (entry.request, entry.outcome, entry.number) == ("RESET", Outcome.FAILED, 3)
-        assert entry.text.endswith("the stop stays latched")
-
-    run(main())
+    await life("STOP", "RESET", latched=stop(1))
+    for _ in range(2):
+        memory = await life()
+        assert (memory.stop.id, memory.stop.by) == (1, "wang")
+    *_, entry = read_entries(log)
+    assert (entry.request, entry.outcome, entry.number) == ("RESET", Outcome.FAILED, 3)
+    assert entry.text.endswith("the stop stays latched")
 
 
-def test_a_damaged_file_gets_a_new_stop_number(tmp_path):
+async def test_a_damaged_file_gets_a_new_stop_number(tmp_path):
     async def life():
         audit = AuditLog(tmp_path / "arm.jsonl")
         found = audit.state
@@ -277,77 +271,65 @@ def test_a_damaged_file_gets_a_new_stop_number(tmp_path):
         await audit.close()
         return found
 
-    async def main():
-        await life()
-        (tmp_path / "arm.latch").write_bytes(b"x" * 2 * SLOT_BYTES)
-        assert (await life()).stop.id > 10**15
-
-    run(main())
+    await life()
+    (tmp_path / "arm.latch").write_bytes(b"x" * 2 * SLOT_BYTES)
+    assert (await life()).stop.id > 10**15
 
 
-def test_a_damaged_latch_file_latches_a_stop_once(tmp_path):
+async def test_a_damaged_latch_file_latches_a_stop_once(tmp_path):
     async def life():
         audit = AuditLog(tmp_path / "arm.jsonl")
         found = audit.state, audit.damage
         await audit.close()
         return found
 
-    async def main():
-        await life()
-        path = tmp_path / "arm.latch"
-        path.write_bytes(path.read_bytes()[:-1])
-        memory, mended = await life()
-        assert memory.stop.reason == LATCH_UNKNOWN
-        assert mended == "its latch file arm.latch is damaged"
-        number = memory.stop.id
-        memory, mended = await life()
-        assert (memory.stop.id, mended) == (number, "")
-
-    run(main())
+    await life()
+    path = tmp_path / "arm.latch"
+    path.write_bytes(path.read_bytes()[:-1])
+    memory, mended = await life()
+    assert memory.stop.reason == LATCH_UNKNOWN
+    assert mended == "its latch file arm.latch is damaged"
+    number = memory.stop.id
+    memory, mended = await life()
+    assert (memory.stop.id, mended) == (number, "")
 
 
-def test_without_an_allocated_file_motion_is_refused_and_stop_works(mesh, tmp_path):
-    async def main():
-        latch = tmp_path / "hall" / "arm.latch"
-        latch.parent.mkdir(parents=True)
-        latch.symlink_to(tmp_path / "gone" / "arm.latch")  # its disk is missing
-        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            assert await refusal(site.command(C.HOME)) == (
-                "Not sent: the latch file arm.latch cannot be allocated (No such file or directory: "
-                "check its disk), so a restart would forget a stop."
-            )
-            await site.command(C.TRACE_ON)  # moves nothing
-            first = await site.stop(by="wang")
-            second = await site.stop(by="zhao")
-            assert first.sent
-            assert second.stop_id > first.stop_id > 10**15  # no disk reserved a small one
-            await until(lambda: site.events("audit.failed"))
-            await until(lambda: site.controller.activity == STATE.STOPPED)
-            latch.unlink()
-            await until(lambda: site.events("audit.mended"))
-            await site.lease(A.RENEW, ttl_s=5)
-            await site.command(C.RESET, stop_id=second.stop_id)
-            await until(lambda: site.controller.activity == STATE.IDLE)
-            await site.command(C.HOME)
-        # The homing ran during the shutdown: its stop is in the new file.
-        assert LatchFile(latch).found.stop.reason == "dead-man: the gateway is shutting down"
-
-    run(main())
+async def test_without_an_allocated_file_motion_is_refused_and_stop_works(mesh, tmp_path):
+    latch = tmp_path / "hall" / "arm.latch"
+    latch.parent.mkdir(parents=True)
+    latch.symlink_to(tmp_path / "gone" / "arm.latch")  # its disk is missing
+    async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+        await site.lease(A.ACQUIRE, ttl_s=5)
+        assert await refusal(site.command(C.HOME)) == (
+            "Not sent: the latch file arm.latch cannot be allocated (No such file or directory: "
+            "check its disk), so a restart would forget a stop."
+        )
+        await site.command(C.TRACE_ON)  # moves nothing
+        first = await site.stop(by="wang")
+        second = await site.stop(by="zhao")
+        assert first.sent
+        assert second.stop_id > first.stop_id > 10**15  # no disk reserved a small one
+        await until(lambda: site.events("audit.failed"))
+        await until(lambda: site.controller.activity == STATE.STOPPED)
+        latch.unlink()
+        await until(lambda: site.events("audit.mended"))
+        await site.lease(A.RENEW, ttl_s=5)
+        await site.command(C.RESET, stop_id=second.stop_id)
+        await until(lambda: site.controller.activity == STATE.IDLE)
+        await site.command(C.HOME)
+    # The homing ran during the shutdown: its stop is in the new file.
+    assert LatchFile(latch).found.stop.reason == "dead-man: the gateway is shutting down"
 
 
-def test_a_locked_log_leaves_the_latch_file_unchanged(tmp_path):
-    async def main():
-        audit = AuditLog(tmp_path / "arm.jsonl")
-        audit.latch.keep(stop(3), 3)
-        settle(audit.latch)
-        before = (tmp_path / "arm.latch").read_bytes()
-        with pytest.raises(AuditError, match="open in another gateway"):
-            AuditLog(tmp_path / "arm.jsonl")
-        assert (tmp_path / "arm.latch").read_bytes() == before
-        await audit.close()
-
-    run(main())
+async def test_a_locked_log_leaves_the_latch_file_unchanged(tmp_path):
+    audit = AuditLog(tmp_path / "arm.jsonl")
+    audit.latch.keep(stop(3), 3)
+    settle(audit.latch)
+    before = (tmp_path / "arm.latch").read_bytes()
+    with pytest.raises(AuditError, match="open in another gateway"):
+        AuditLog(tmp_path / "arm.jsonl")
+    assert (tmp_path / "arm.latch").read_bytes() == before
+    await audit.close()
 
 
 @pytest.mark.slow

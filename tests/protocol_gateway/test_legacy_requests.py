@@ -34,7 +34,6 @@ from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of
-from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 
 JOINTS = joints_of(load("pt600"))
@@ -140,40 +139,31 @@ def test_a_refused_unit_has_one_error_number(unit, number):
         ("1#COMMAND*hold;home", READY, 8),
     ],
 )
-def test_a_refusal_has_the_number_of_its_reason(tmp_path, unit, controller, number):
-    async def main():
-        async with control_bench(tmp_path) as bench:
-            await bench.lease(A.ACQUIRE)
-            bench.known = controller
-            assert await refused(bench, unit) == number
-            assert bench.socket == []
-
-    run(main())
+async def test_a_refusal_has_the_number_of_its_reason(tmp_path, unit, controller, number):
+    async with control_bench(tmp_path) as bench:
+        await bench.lease(A.ACQUIRE)
+        bench.known = controller
+        assert await refused(bench, unit) == number
+        assert bench.socket == []
 
 
-def test_without_control_the_refusal_is_read_only(tmp_path):
-    async def main():
-        async with control_bench(tmp_path) as bench:
-            assert await refused(bench, "1#COMMAND*home") == 7
-            await bench.lease(A.ACQUIRE)
-            asked = asyncio.create_task(refused(bench, "1#COMMAND*home"))
-            await asyncio.sleep(0)  # the audit entry is being written now
-            bench.control.handle(LeaseEnded(codes.ENDED_GATEWAY()))
-            assert await asked == 7
-
-    run(main())
+async def test_without_control_the_refusal_is_read_only(tmp_path):
+    async with control_bench(tmp_path) as bench:
+        assert await refused(bench, "1#COMMAND*home") == 7
+        await bench.lease(A.ACQUIRE)
+        asked = asyncio.create_task(refused(bench, "1#COMMAND*home"))
+        await asyncio.sleep(0)  # the audit entry is being written now
+        bench.control.handle(LeaseEnded(codes.ENDED_GATEWAY()))
+        assert await asked == 7
 
 
-def test_motion_under_a_latched_stop_and_a_reset_while_the_robot_moves_are_refused_as_stopped(tmp_path):
-    async def main():
-        async with control_bench(tmp_path) as bench:
-            await bench.lease(A.ACQUIRE)
-            bench.control.stop(by="wang", reason="smoke", source="test")
-            assert await refused(bench, "1#COMMAND*home", first_id=1) == 8
-            bench.control.handle(MotionObserved(True))
-            assert await refused(bench, "1#COMMAND*reset", first_id=2, stop_id=1) == 8
-
-    run(main())
+async def test_motion_under_a_latched_stop_and_a_reset_while_the_robot_moves_are_refused_as_stopped(tmp_path):
+    async with control_bench(tmp_path) as bench:
+        await bench.lease(A.ACQUIRE)
+        bench.control.stop(by="wang", reason="smoke", source="test")
+        assert await refused(bench, "1#COMMAND*home", first_id=1) == 8
+        bench.control.handle(MotionObserved(True))
+        assert await refused(bench, "1#COMMAND*reset", first_id=2, stop_id=1) == 8
 
 
 def test_reset_means_a_stop_that_its_sender_can_have_seen():
@@ -223,25 +213,21 @@ def test_recoveries_are_refused_in_words(word):
     assert "may not recover a controller" in answer.text
 
 
-def test_a_recovery_of_another_source_than_the_mesh_or_beside_others_is_refused(tmp_path):
+async def test_a_recovery_of_another_source_than_the_mesh_or_beside_others_is_refused(tmp_path):
     capabilities = Capabilities(commands=COMMANDS, recoveries=frozenset(Recovery))
     recover = Recover(recovery=Recover.POWER_ON, reason="fuse", looked=True)
     mine = {"command": C.RECOVER, "recover": recover}
-
-    async def main():
-        async with control_bench(tmp_path) as bench:
-            bench.known = replace(READY, capabilities=capabilities, recover=frozenset(Recovery))
+    async with control_bench(tmp_path) as bench:
+        bench.known = replace(READY, capabilities=capabilities, recover=frozenset(Recovery))
+        await bench.lease(A.ACQUIRE)
+        bench.control.handle(MotionObserved(moving=False))
+        for source, alone in (("tcp 10.0.0.9", True), ("program", True), ("mesh", False)):
+            request = CommandRequest(lease=bench.secret, id=1, **mine)
+            others = [] if alone else [CommandRequest(lease=bench.secret, id=2, command=C.HOLD)]
+            answer = await bench.control.attempt([request, *others], operator="li", source=source)
+            assert answer.reason.code == codes.RECOVER_PROGRAM.name, source
+            await bench.lease(A.RELEASE, lease=bench.secret)
             await bench.lease(A.ACQUIRE)
-            bench.control.handle(MotionObserved(moving=False))
-            for source, alone in (("tcp 10.0.0.9", True), ("program", True), ("mesh", False)):
-                request = CommandRequest(lease=bench.secret, id=1, **mine)
-                others = [] if alone else [CommandRequest(lease=bench.secret, id=2, command=C.HOLD)]
-                answer = await bench.control.attempt([request, *others], operator="li", source=source)
-                assert answer.reason.code == codes.RECOVER_PROGRAM.name, source
-                await bench.lease(A.RELEASE, lease=bench.secret)
-                await bench.lease(A.ACQUIRE)
-            step = await bench.control.step(CommandRequest(lease=bench.secret, **mine), operator="li")
-            assert step.reason.code == codes.RECOVER_PROGRAM.name
-            assert bench.socket == []
-
-    run(main())
+        step = await bench.control.step(CommandRequest(lease=bench.secret, **mine), operator="li")
+        assert step.reason.code == codes.RECOVER_PROGRAM.name
+        assert bench.socket == []

@@ -13,7 +13,6 @@ from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of
-from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 from tests.protocol_gateway.gateway_site import gateway, simulator, until
 
@@ -151,38 +150,32 @@ def test_rest_proves_nothing_if_the_robot_moved_before_the_command():
         (Activity.IDLE, HOME, 9.0, True),
     ],
 )
-def test_releasing_control_stops_motion_without_proof_of_its_end(
+async def test_releasing_control_stops_motion_without_proof_of_its_end(
     tmp_path, clock, activity, positions, age_s, latched
 ):
-    async def main():
-        async with control_bench(tmp_path) as bench:
-            bench.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
-            bench.control.handle(MotionObserved(False))
-            await bench.lease(A.ACQUIRE)
-            await bench.commands((C.HOME, {}))
-            clock.advance(0.1)
-            bench.control.handle(MotionObserved(True))
-            bench.status, bench.positions = replace(bench.status, activity=activity, homed=True), positions
-            clock.advance(0.1)
-            bench.control.handle(MotionObserved(False))
-            for _ in range(2):
-                clock.advance(0.01)
-                bench.control.handle(StatusReported(activity, clock.now.monotonic_s - age_s))
-            await bench.lease(A.RELEASE, lease=bench.secret)
-            assert (bench.control.authority.stop is not None) is latched
-            assert any(unit == b"1#COMMAND*stop@" for unit in bench.socket) is latched
-
-    run(main())
+    async with control_bench(tmp_path) as bench:
+        bench.status = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=False)
+        bench.control.handle(MotionObserved(False))
+        await bench.lease(A.ACQUIRE)
+        await bench.commands((C.HOME, {}))
+        clock.advance(0.1)
+        bench.control.handle(MotionObserved(True))
+        bench.status, bench.positions = replace(bench.status, activity=activity, homed=True), positions
+        clock.advance(0.1)
+        bench.control.handle(MotionObserved(False))
+        for _ in range(2):
+            clock.advance(0.01)
+            bench.control.handle(StatusReported(activity, clock.now.monotonic_s - age_s))
+        await bench.lease(A.RELEASE, lease=bench.secret)
+        assert (bench.control.authority.stop is not None) is latched
+        assert any(unit == b"1#COMMAND*stop@" for unit in bench.socket) is latched
 
 
-def test_releasing_control_at_home_stops_nothing(mesh, tmp_path):
-    async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-            await site.home()
-            await site.lease(A.RELEASE)
-            await until(lambda: not site.seen["lease"][-1].holder)
-            await site.units(3)
-            assert [each.request for each in site.seen["audit"] if each.operator == GATEWAY] == []
-            assert site.controller.stop.id == 0
-
-    run(main())
+async def test_releasing_control_at_home_stops_nothing(mesh, tmp_path):
+    async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+        await site.home()
+        await site.lease(A.RELEASE)
+        await until(lambda: not site.seen["lease"][-1].holder)
+        await site.units(3)
+        assert [each.request for each in site.seen["audit"] if each.operator == GATEWAY] == []
+        assert site.controller.stop.id == 0

@@ -70,14 +70,11 @@ def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_path):
     run(main(), timeout_s=120)
 
 
-def test_the_state_has_nested_reasons(mesh, tmp_path):
-    async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port, stop_proven=False) as site:
-            await until(lambda: site.controller.read_only)
-            connected, why = site.controller.link_reasons
-            assert (connected.code, connected.values["where"]) == ("link.connected", f"127.0.0.1:{port}")
-            assert (why.code, why.causes[0].code) == ("robot.is_read_only", "robot.stop_not_proven")
-            found = await code(site.lease(A.ACQUIRE))
-            assert (found.code, found.causes[0].code) == ("robot.read_only", "robot.stop_not_proven")
-
-    run(main())
+async def test_the_state_has_nested_reasons(mesh, tmp_path):
+    async with simulator() as port, gateway(mesh, tmp_path, port, stop_proven=False) as site:
+        await until(lambda: site.controller.read_only)
+        connected, why = site.controller.link_reasons
+        assert (connected.code, connected.values["where"]) == ("link.connected", f"127.0.0.1:{port}")
+        assert (why.code, why.causes[0].code) == ("robot.is_read_only", "robot.stop_not_proven")
+        found = await code(site.lease(A.ACQUIRE))
+        assert (found.code, found.causes[0].code) == ("robot.read_only", "robot.stop_not_proven")

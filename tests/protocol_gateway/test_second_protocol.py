@@ -27,7 +27,6 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.kinematics.joints import JointType
 from services.errors import SiteFileError
 from services.site_file.site import load
-from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "driver"
@@ -82,37 +81,36 @@ async def json_controller():
         yield server.sockets[0].getsockname()[1], heard, state
 
 
-def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_other(mesh, tmp_path, installed):
-    async def main():
-        async with (
-            json_controller() as (port, heard, state),
-            gateway(mesh, tmp_path, port, protocol="json-lines") as site,
-        ):
-            await until(lambda: site.joints == [0.1] * 5)
-            # Positions and state are two topics.
-            await until(lambda: site.controller.mode == STATE.REMOTE)
-            assert site.controller.homed == STATE.YES
-            able = site.controller.capabilities
-            assert able.stops == schema.Capabilities.ANY
-            assert set(able.commands) == {C.HOME, C.RESET, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            target = [0.2, 0.3, -0.1, 0.1, 0.3]
-            await site.command(C.MOVE_ABSOLUTE, joint_positions=target)
-            await until(lambda: site.joints == target)
-            await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)  # a busy machine may have taken over 5 s
-            assert "this controller has no TRACE_ON" in await refusal(site.command(C.TRACE_ON))
-            far = [math.radians(170.0), *target[1:]]
-            assert "waist" in await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=far))
-            stop = await site.stop(by="wang")
-            await until(lambda: site.controller.activity == STATE.STOPPED)
-            await site.lease(A.RENEW, ttl_s=5)
-            await site.command(C.RESET, stop_id=stop.stop_id)
-            await until(lambda: heard[-1] == "reset")
-            state["q"] = [0.0] * 3
-            await until(lambda: site.events("unit.malformed"))
-            await until(lambda: site.controller.link == STATE.SILENT)
-
-    run(main())
+async def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_other(
+    mesh, tmp_path, installed
+):
+    async with (
+        json_controller() as (port, heard, state),
+        gateway(mesh, tmp_path, port, protocol="json-lines") as site,
+    ):
+        await until(lambda: site.joints == [0.1] * 5)
+        # Positions and state are two topics.
+        await until(lambda: site.controller.mode == STATE.REMOTE)
+        assert site.controller.homed == STATE.YES
+        able = site.controller.capabilities
+        assert able.stops == schema.Capabilities.ANY
+        assert set(able.commands) == {C.HOME, C.RESET, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
+        await site.lease(A.ACQUIRE, ttl_s=5)
+        target = [0.2, 0.3, -0.1, 0.1, 0.3]
+        await site.command(C.MOVE_ABSOLUTE, joint_positions=target)
+        await until(lambda: site.joints == target)
+        await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)  # a busy machine may have taken over 5 s
+        assert "this controller has no TRACE_ON" in await refusal(site.command(C.TRACE_ON))
+        far = [math.radians(170.0), *target[1:]]
+        assert "waist" in await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=far))
+        stop = await site.stop(by="wang")
+        await until(lambda: site.controller.activity == STATE.STOPPED)
+        await site.lease(A.RENEW, ttl_s=5)
+        await site.command(C.RESET, stop_id=stop.stop_id)
+        await until(lambda: heard[-1] == "reset")
+        state["q"] = [0.0] * 3
+        await until(lambda: site.events("unit.malformed"))
+        await until(lambda: site.controller.link == STATE.SILENT)
 
 
 def test_an_installed_driver_is_a_protocol_of_the_site_file_and_gets_its_table(tmp_path, installed):

@@ -13,7 +13,6 @@ from protocol_gateway.seam import Signal, SignalsReceived
 from protocol_gateway.telemetry import set_up_file
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import MOST_SIGNALS, Signals
-from tests.conftest import run
 from tests.controllers.universal_robots.test_rtde_driver import UR, controller
 from tests.protocol_gateway.gateway_site import gateway, until
 
@@ -197,21 +196,18 @@ def test_changes_of_the_tool_are_unconfirmed_until_they_are_undone_or_confirmed(
     assert robot.signals.unconfirmed == ("tool.number 3 → 1",)
 
 
-def test_a_change_of_the_tool_while_no_gateway_ran_is_one_too(mesh, tmp_path):
-    async def main():
-        path = tmp_path / "hall" / "arm.tool"
-        async with controller() as ports:
-            settings = {**UR, "ports": {"primary": ports[1]}}
-            async with gateway(mesh, tmp_path, ports[0], **settings):
-                await until(path.exists)
-            kept = json.loads(path.read_text())
-            assert kept["payload.mass"] == pytest.approx(1.2)
-            path.write_text(json.dumps(kept | {"payload.mass": 3.0}))
-            async with gateway(mesh, tmp_path, ports[0], **settings) as site:
-                event = await site.event("controller.payload_changed", 0)
-                assert event.values["changes"].startswith("payload.mass 3 → ")
-
-    run(main())
+async def test_a_change_of_the_tool_while_no_gateway_ran_is_one_too(mesh, tmp_path):
+    path = tmp_path / "hall" / "arm.tool"
+    async with controller() as ports:
+        settings = {**UR, "ports": {"primary": ports[1]}}
+        async with gateway(mesh, tmp_path, ports[0], **settings):
+            await until(path.exists)
+        kept = json.loads(path.read_text())
+        assert kept["payload.mass"] == pytest.approx(1.2)
+        path.write_text(json.dumps(kept | {"payload.mass": 3.0}))
+        async with gateway(mesh, tmp_path, ports[0], **settings) as site:
+            event = await site.event("controller.payload_changed", 0)
+            assert event.values["changes"].startswith("payload.mass 3 → ")
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"tool.number": [1]}', b"[" * 50_000, b'{"a": NaN}'])

@@ -7,7 +7,6 @@ import time
 
 import pytest
 
-from tests.conftest import run
 from tests.protocol_gateway.gateway_site import gateway, until
 
 # Delay between a unit's writing and its reading on a busy machine.
@@ -89,34 +88,31 @@ async def flood(controller, writer):
 
 
 @pytest.mark.parametrize("way", [split, burst, freeze, flood])
-def test_no_joints_message_is_stamped_newer_than_its_unit(mesh, tmp_path, way):
-    async def main():
-        done = asyncio.Event()
+async def test_no_joints_message_is_stamped_newer_than_its_unit(mesh, tmp_path, way):
+    done = asyncio.Event()
 
-        async def whole_way(controller, reader, writer):
-            await way(controller, writer)
-            done.set()
-            with contextlib.suppress(ConnectionError):
-                await reader.read()
+    async def whole_way(controller, reader, writer):
+        await way(controller, writer)
+        done.set()
+        with contextlib.suppress(ConnectionError):
+            await reader.read()
 
-        controller = Clocked(whole_way)
-        server = await asyncio.start_server(controller.serve, "127.0.0.1", 0)
-        port = server.sockets[0].getsockname()[1]
-        patient = {"stale_after_s": 5.0, "reconnect_after_s": 20.0}
-        async with server, gateway(mesh, tmp_path, port, up=False, **patient) as site:
-            await done.wait()
-            await until(lambda: number_of(site.seen["joints"][-1]) == (len(controller.made_ns) - 1) % 9000)
-            seen = [(number_of(each), each.timestamp.ToNanoseconds()) for each in site.seen["joints"]]
-        assert len(seen) >= 50
-        late_ns = [stamp_ns - controller.made_ns[number] for number, stamp_ns in seen]
-        if way is split:
-            # A unit is received with its last byte: creation and end of writing are 30 ms apart.
-            late_ns = [stamp_ns - controller.written_ns[number] for number, stamp_ns in seen]
-        assert max(late_ns) < _SLACK_S * 1e9
-        # Delayed units are stamped by the controller's clock.
-        assert all(stamp_ns >= controller.made_ns[number] - 1e6 for number, stamp_ns in seen)
-
-    run(main())
+    controller = Clocked(whole_way)
+    server = await asyncio.start_server(controller.serve, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    patient = {"stale_after_s": 5.0, "reconnect_after_s": 20.0}
+    async with server, gateway(mesh, tmp_path, port, up=False, **patient) as site:
+        await done.wait()
+        await until(lambda: number_of(site.seen["joints"][-1]) == (len(controller.made_ns) - 1) % 9000)
+        seen = [(number_of(each), each.timestamp.ToNanoseconds()) for each in site.seen["joints"]]
+    assert len(seen) >= 50
+    late_ns = [stamp_ns - controller.made_ns[number] for number, stamp_ns in seen]
+    if way is split:
+        # A unit is received with its last byte: creation and end of writing are 30 ms apart.
+        late_ns = [stamp_ns - controller.written_ns[number] for number, stamp_ns in seen]
+    assert max(late_ns) < _SLACK_S * 1e9
+    # Delayed units are stamped by the controller's clock.
+    assert all(stamp_ns >= controller.made_ns[number] - 1e6 for number, stamp_ns in seen)
 
 
 def number_of(joints):

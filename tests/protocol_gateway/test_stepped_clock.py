@@ -8,7 +8,6 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from protocol_gateway.control import clocks
 from robomesh.errors import RefusedError
-from tests.conftest import run
 from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 
 HOUR_NS = 3600 * 10**9
@@ -24,39 +23,36 @@ def system_clock(monkeypatch):
 
 
 @pytest.mark.parametrize("set_by_ns", [-HOUR_NS, HOUR_NS])
-def test_no_step_of_the_systems_clock_moves_a_deadline(mesh, tmp_path, system_clock, set_by_ns):
-    async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-            answer = await site.lease(A.ACQUIRE, ttl_s=5)
-            gateway_minus_monotonic_ns = answer.now.ToNanoseconds() - time.monotonic_ns()
+async def test_no_step_of_the_systems_clock_moves_a_deadline(mesh, tmp_path, system_clock, set_by_ns):
+    async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+        answer = await site.lease(A.ACQUIRE, ttl_s=5)
+        gateway_minus_monotonic_ns = answer.now.ToNanoseconds() - time.monotonic_ns()
 
-            async def speed(number, after_s):
-                """Send a command with a deadline, by what the first lease answer said."""
-                not_after = Timestamp()
-                ns = time.monotonic_ns() + gateway_minus_monotonic_ns
-                not_after.FromNanoseconds(ns + round(after_s * 1e9))
-                try:
-                    await site.command(C.SPEED, speed_percent=50, id=number, not_after=not_after)
-                except RefusedError as error:
-                    return error.code
-                return "done"
+        async def speed(number, after_s):
+            """Send a command with a deadline, by what the first lease answer said."""
+            not_after = Timestamp()
+            ns = time.monotonic_ns() + gateway_minus_monotonic_ns
+            not_after.FromNanoseconds(ns + round(after_s * 1e9))
+            try:
+                await site.command(C.SPEED, speed_percent=50, id=number, not_after=not_after)
+            except RefusedError as error:
+                return error.code
+            return "done"
 
-            system_clock.set_by_ns = set_by_ns
-            assert await speed(1, -0.5) == "command.late"
-            assert await speed(2, 3600) == "command.deadline_far"
-            assert await speed(3, 4) == "done"
-            again = await site.lease(A.RENEW, ttl_s=5)
-            assert 0 < again.until.ToNanoseconds() - again.now.ToNanoseconds() <= 5 * 10**9
-            assert 0 < again.now.ToNanoseconds() - answer.now.ToNanoseconds() < 60 * 10**9
-            # The page compares them: a lease published later is later.
-            await until(lambda: site.seen["lease"][-1].timestamp.ToNanoseconds() > again.now.ToNanoseconds())
-            published = site.seen["lease"][-1].timestamp.ToNanoseconds()
-            assert published - again.now.ToNanoseconds() < 60 * 10**9
-            # People read the system's clock in the audit log.
-            entry = site.seen["audit"][-1]
-            assert abs(entry.timestamp.ToNanoseconds() - time.time_ns()) < 60 * 10**9
-
-    run(main())
+        system_clock.set_by_ns = set_by_ns
+        assert await speed(1, -0.5) == "command.late"
+        assert await speed(2, 3600) == "command.deadline_far"
+        assert await speed(3, 4) == "done"
+        again = await site.lease(A.RENEW, ttl_s=5)
+        assert 0 < again.until.ToNanoseconds() - again.now.ToNanoseconds() <= 5 * 10**9
+        assert 0 < again.now.ToNanoseconds() - answer.now.ToNanoseconds() < 60 * 10**9
+        # The page compares them: a lease published later is later.
+        await until(lambda: site.seen["lease"][-1].timestamp.ToNanoseconds() > again.now.ToNanoseconds())
+        published = site.seen["lease"][-1].timestamp.ToNanoseconds()
+        assert published - again.now.ToNanoseconds() < 60 * 10**9
+        # People read the system's clock in the audit log.
+        entry = site.seen["audit"][-1]
+        assert abs(entry.timestamp.ToNanoseconds() - time.time_ns()) < 60 * 10**9
 
 
 def test_the_gateways_time_begins_with_the_wall_clock_and_never_steps(system_clock):

@@ -35,7 +35,7 @@ from robots.descriptions.description import load
 from robots.kinematics.joints import JointType, joints_of
 from robots.kinematics.model import build_model, tool_placement
 from robots.schema.poses import axis_rotation
-from tests.conftest import last_value, run
+from tests.conftest import last_value
 from tests.controllers.fanuc.ftp_site import (
     FANUC_FTP,
     SETTINGS,
@@ -408,61 +408,54 @@ def test_settings_that_do_not_fit_are_refused(tmp_path):
 # ------------------------------------------------------------- in a gateway
 
 
-def test_gateway_shows_the_arm_its_alarms_and_that_it_is_slow(mesh, tmp_path):
+async def test_gateway_shows_the_arm_its_alarms_and_that_it_is_slow(mesh, tmp_path):
     arm = joints_of(load("puma560"))
     model = build_model(load("puma560"))
-
-    async def main():
-        async with contextlib.AsyncExitStack() as stack:
-            port = await stack.enter_async_context(controller(demo=True, faults=("fault@1+2",)))
-            site = await stack.enter_async_context(gateway(mesh, tmp_path, port, up=False, **FANUC_FTP))
-            await until(lambda: site.events("controller.alarm"))
-            await until(lambda: site.controller.activity == STATE.FAULT)
-            await until(lambda: site.controller.activity == STATE.MOVING)
-            await until(lambda: len({tuple(j.position for j in s.joints) for s in site.seen["joints"]}) > 3)
-            assert "SRVO-001" in site.events("controller.alarm")[0].text
-            state = site.controller
-            assert state.capabilities.slow_hz == SETTINGS.rate_hz
-            assert (state.read_only, state.joints_unproven) == (True, True)
-            assert state.software == "V0.00P/00 simulated"
-            assert state.health.HasField("stamp_uncertainty_s")
-            # The connections for single files are neither counted nor reported.
-            assert state.counters.connections == 1
-            assert not site.events("link.channel_lost")
-            assert len(arm.types) == len(site.joints)
-            async with open_session(mesh) as session:
-                signals = (await last_value(session, site.key("signals"))).signals
-            pose = {each.name: each.number for each in signals if each.name.startswith("tool.pose")}
-            newest = site.seen["joints"][-1]
-            placement = tool_placement(model, np.array([joint.position for joint in newest.joints]))
-            # They are of different files' times while the arm moves: near, not equal.
-            vector = np.array([pose[f"tool.pose.r{axis}"] for axis in "xyz"])
-            turned = axis_rotation(vector, float(np.linalg.norm(vector)))
-            assert np.linalg.norm(placement[:3, 3] - [pose[f"tool.pose.{axis}"] for axis in "xyz"]) < 0.2
-            assert np.trace(turned.T @ placement[:3, :3]) > 2.5
-
-    run(main())
+    async with contextlib.AsyncExitStack() as stack:
+        port = await stack.enter_async_context(controller(demo=True, faults=("fault@1+2",)))
+        site = await stack.enter_async_context(gateway(mesh, tmp_path, port, up=False, **FANUC_FTP))
+        await until(lambda: site.events("controller.alarm"))
+        await until(lambda: site.controller.activity == STATE.FAULT)
+        await until(lambda: site.controller.activity == STATE.MOVING)
+        await until(lambda: len({tuple(j.position for j in s.joints) for s in site.seen["joints"]}) > 3)
+        assert "SRVO-001" in site.events("controller.alarm")[0].text
+        state = site.controller
+        assert state.capabilities.slow_hz == SETTINGS.rate_hz
+        assert (state.read_only, state.joints_unproven) == (True, True)
+        assert state.software == "V0.00P/00 simulated"
+        assert state.health.HasField("stamp_uncertainty_s")
+        # The connections for single files are neither counted nor reported.
+        assert state.counters.connections == 1
+        assert not site.events("link.channel_lost")
+        assert len(arm.types) == len(site.joints)
+        async with open_session(mesh) as session:
+            signals = (await last_value(session, site.key("signals"))).signals
+        pose = {each.name: each.number for each in signals if each.name.startswith("tool.pose")}
+        newest = site.seen["joints"][-1]
+        placement = tool_placement(model, np.array([joint.position for joint in newest.joints]))
+        # They are of different files' times while the arm moves: near, not equal.
+        vector = np.array([pose[f"tool.pose.r{axis}"] for axis in "xyz"])
+        turned = axis_rotation(vector, float(np.linalg.norm(vector)))
+        assert np.linalg.norm(placement[:3, 3] - [pose[f"tool.pose.{axis}"] for axis in "xyz"]) < 0.2
+        assert np.trace(turned.T @ placement[:3, :3]) > 2.5
 
 
-def test_controller_that_refuses_the_user_is_down_and_says_so(mesh, tmp_path):
-    async def main():
-        async def refuse(reader, writer):
-            writer.write(b"220 R-30iB FTP server ready.\r\n")
-            await reader.readline()
-            writer.write(b"530 Not logged in.\r\n")
-            # Until the gateway ends the connection.
-            await reader.read()
-            writer.close()
+async def test_controller_that_refuses_the_user_is_down_and_says_so(mesh, tmp_path):
+    async def refuse(reader, writer):
+        writer.write(b"220 R-30iB FTP server ready.\r\n")
+        await reader.readline()
+        writer.write(b"530 Not logged in.\r\n")
+        # Until the gateway ends the connection.
+        await reader.read()
+        writer.close()
 
-        async with await asyncio.start_server(refuse, "127.0.0.1", 0) as server:
-            port = server.sockets[0].getsockname()[1]
-            robot = {**FANUC_FTP, "options": replace(SETTINGS, user="li")}
-            async with gateway(mesh, tmp_path, port, up=False, **robot) as site:
-                await until(
-                    lambda: (
-                        site.controller.link == STATE.DOWN
-                        and "it refuses the user li: 530 Not logged in." in site.controller.link_text
-                    )
+    async with await asyncio.start_server(refuse, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        robot = {**FANUC_FTP, "options": replace(SETTINGS, user="li")}
+        async with gateway(mesh, tmp_path, port, up=False, **robot) as site:
+            await until(
+                lambda: (
+                    site.controller.link == STATE.DOWN
+                    and "it refuses the user li: 530 Not logged in." in site.controller.link_text
                 )
-
-    run(main())
+            )

@@ -528,41 +528,38 @@ def packets(data):
     return found
 
 
-def test_a_controller_with_snpx_is_shown_and_nothing_is_written_but_its_own_assignments(mesh, tmp_path):
-    async def main():
-        async with (
-            controller(demo=True, faults=("fault@4",)) as port,
-            wire(port) as relay,
-            gateway(mesh, tmp_path, relay.port, **FANUC) as site,
-        ):
-            await until(lambda: site.controller.activity == STATE.MOVING)
-            assert site.controller.mode == STATE.REMOTE
-            await site.units(50)
-            first, last = (site.seen["joints"][at] for at in (0, -1))
-            assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
-            assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
-            assert "Not sent" in await refusal(site.command(C.HOME))
-            answer = await site.stop(by="wang")
-            assert not answer.sent
-            await until(lambda: any(each.values["number"] for each in site.events("controller.alarm")))
-            event = site.events("controller.alarm")[-1]
-            assert (event.values["number"], event.severity) == ("SRVO-001", event.ERROR)
-            await until(lambda: site.controller.activity == STATE.FAULT)
-            assert 0.0 < site.controller.health.stamp_uncertainty_s < 0.5
-            # Proven by a decode of all that was sent.
-            found = packets(relay.data)
-            assert (found[0], found[1][42:44]) == (bytes(56), b"\x4f\x01")
-            texts = [each[56:].decode() for each in found if each[31] == 0x80]
-            # A text goes to %G, by the service that writes; everything else reads.
-            assert {each[50:54] for each in found if each[31] == 0x80} == {b"\x07\x38\0\0"}
-            assert {each[42] for each in found[2:] if each[31] == 0xC0} == {0x04}
-            assert {each[31] for each in found[1:]} == {0x80, 0xC0}
-            assert all(each[48:] == bytes(8) for each in found if each[31] == 0xC0)
-            assert texts[0] == "CLRASG"
-            assert all(re.fullmatch(r"SETASG 1\d{4} \d+ \S+ \d+", each) for each in texts[1:])
-            assert len(texts) == 1 + len(FANUC["options"].table.assignments)
-
-    run(main())
+async def test_a_controller_with_snpx_is_shown_and_nothing_is_written_but_its_own_assignments(mesh, tmp_path):
+    async with (
+        controller(demo=True, faults=("fault@4",)) as port,
+        wire(port) as relay,
+        gateway(mesh, tmp_path, relay.port, **FANUC) as site,
+    ):
+        await until(lambda: site.controller.activity == STATE.MOVING)
+        assert site.controller.mode == STATE.REMOTE
+        await site.units(50)
+        first, last = (site.seen["joints"][at] for at in (0, -1))
+        assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
+        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "Not sent" in await refusal(site.command(C.HOME))
+        answer = await site.stop(by="wang")
+        assert not answer.sent
+        await until(lambda: any(each.values["number"] for each in site.events("controller.alarm")))
+        event = site.events("controller.alarm")[-1]
+        assert (event.values["number"], event.severity) == ("SRVO-001", event.ERROR)
+        await until(lambda: site.controller.activity == STATE.FAULT)
+        assert 0.0 < site.controller.health.stamp_uncertainty_s < 0.5
+        # Proven by a decode of all that was sent.
+        found = packets(relay.data)
+        assert (found[0], found[1][42:44]) == (bytes(56), b"\x4f\x01")
+        texts = [each[56:].decode() for each in found if each[31] == 0x80]
+        # A text goes to %G, by the service that writes; everything else reads.
+        assert {each[50:54] for each in found if each[31] == 0x80} == {b"\x07\x38\0\0"}
+        assert {each[42] for each in found[2:] if each[31] == 0xC0} == {0x04}
+        assert {each[31] for each in found[1:]} == {0x80, 0xC0}
+        assert all(each[48:] == bytes(8) for each in found if each[31] == 0xC0)
+        assert texts[0] == "CLRASG"
+        assert all(re.fullmatch(r"SETASG 1\d{4} \d+ \S+ \d+", each) for each in texts[1:])
+        assert len(texts) == 1 + len(FANUC["options"].table.assignments)
 
 
 def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path):
@@ -589,33 +586,25 @@ def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path
     assert rotation == pytest.approx(placement[:3, :3], abs=1e-4)
 
 
-def test_two_clients_of_one_table_do_not_fight_and_show_no_wrong_joints(mesh, tmp_path):
-    async def main():
-        other = FANUC | {"options": with_defaults(FanucSettings(registers=(1,)), SIX)}
-        async with (
-            controller(shared=True) as port,
-            gateway(mesh, tmp_path / "a", port, **FANUC) as first,
-        ):
-            await first.units(3)
-            async with gateway(mesh, tmp_path / "b", port, up=False, **other):
-                await until(
-                    lambda: any("keeps one table for all" in each.text for each in first.seen["events"])
-                )
-            home = joints_of(load("puma560")).home
-            for state in first.seen["joints"]:
-                assert [each.position for each in state.joints] == pytest.approx(home, abs=1e-6)
-
-    run(main())
+async def test_two_clients_of_one_table_do_not_fight_and_show_no_wrong_joints(mesh, tmp_path):
+    other = FANUC | {"options": with_defaults(FanucSettings(registers=(1,)), SIX)}
+    async with (
+        controller(shared=True) as port,
+        gateway(mesh, tmp_path / "a", port, **FANUC) as first,
+    ):
+        await first.units(3)
+        async with gateway(mesh, tmp_path / "b", port, up=False, **other):
+            await until(lambda: any("keeps one table for all" in each.text for each in first.seen["events"]))
+        home = joints_of(load("puma560")).home
+        for state in first.seen["joints"]:
+            assert [each.position for each in state.joints] == pytest.approx(home, abs=1e-6)
 
 
-def test_without_a_declaration_the_robot_is_shown_without_joints_and_says_why(mesh, tmp_path):
-    async def main():
-        async with (
-            controller() as port,
-            gateway(mesh, tmp_path, port, **FANUC | {"options": None}) as site,
-        ):
-            await until(lambda: site.controller.activity == STATE.IDLE)
-            assert "declare j23 and assignments" in site.controller.link_text
-            assert not site.seen["joints"]
-
-    run(main())
+async def test_without_a_declaration_the_robot_is_shown_without_joints_and_says_why(mesh, tmp_path):
+    async with (
+        controller() as port,
+        gateway(mesh, tmp_path, port, **FANUC | {"options": None}) as site,
+    ):
+        await until(lambda: site.controller.activity == STATE.IDLE)
+        assert "declare j23 and assignments" in site.controller.link_text
+        assert not site.seen["joints"]

@@ -22,7 +22,6 @@ from robots.kinematics.joints import joints_of
 from robots.kinematics.model import build_model, link_placements
 from robots.kinematics.verification import Sample, verify
 from robots.schema.poses import axis_rotation
-from tests.conftest import run
 from tests.controllers.simulated_site import running
 
 pytestmark = pytest.mark.slow
@@ -100,162 +99,138 @@ async def client(port):
         found.writer.close()
 
 
-def test_a_new_connection_has_the_delivered_table_until_it_begins_its_own():
-    async def main():
-        async with simulator() as port, client(port) as one, client(port) as other:
-            # R[1] is 12.5, as an integer of 16 bits; as another program assigns it.
-            assert await one.words(1, 2) == struct.pack("<2h", 12, 0)
-            assert await one.ask(Clear()) == b""
-            assert await one.words(1, 2) == bytes(4)
-            assert await other.words(1, 1) == struct.pack("<h", 12)
-            assert await one.assign("SETASG 1 2 R[1] 0")
-            assert await one.words(1, 2) == struct.pack("<f", 12.5)
-            assert await one.assign("SETASG 11 4 R[1] 100")
-            assert await one.words(11, 4) == struct.pack("<2i", 1250, 0)
-            # Of two assignments of a word the earlier one counts, and an answer may begin within a value.
-            assert await one.assign("SETASG 2 4 $MCR.$GENOVERRIDE 1")
-            assert await one.words(2, 2) == struct.pack("<f", 12.5)[2:] + b"\0\0"
-
-    run(main())
+async def test_a_new_connection_has_the_delivered_table_until_it_begins_its_own():
+    async with simulator() as port, client(port) as one, client(port) as other:
+        # R[1] is 12.5, as an integer of 16 bits; as another program assigns it.
+        assert await one.words(1, 2) == struct.pack("<2h", 12, 0)
+        assert await one.ask(Clear()) == b""
+        assert await one.words(1, 2) == bytes(4)
+        assert await other.words(1, 1) == struct.pack("<h", 12)
+        assert await one.assign("SETASG 1 2 R[1] 0")
+        assert await one.words(1, 2) == struct.pack("<f", 12.5)
+        assert await one.assign("SETASG 11 4 R[1] 100")
+        assert await one.words(11, 4) == struct.pack("<2i", 1250, 0)
+        # Of two assignments of a word the earlier one counts, and an answer may begin within a value.
+        assert await one.assign("SETASG 2 4 $MCR.$GENOVERRIDE 1")
+        assert await one.words(2, 2) == struct.pack("<f", 12.5)[2:] + b"\0\0"
 
 
-def test_one_table_for_all_is_cleared_by_any_client():
-    async def main():
-        async with simulator(shared=True) as port, client(port) as one, client(port) as other:
-            assert await one.words(1, 1) == struct.pack("<h", 12)
-            assert await other.ask(Clear()) == b""
-            assert await one.words(1, 1) == bytes(2)
-            assert await other.assign("SETASG 1 2 R[1] 0")
-            assert await one.words(1, 2) == struct.pack("<f", 12.5)
-
-    run(main())
+async def test_one_table_for_all_is_cleared_by_any_client():
+    async with simulator(shared=True) as port, client(port) as one, client(port) as other:
+        assert await one.words(1, 1) == struct.pack("<h", 12)
+        assert await other.ask(Clear()) == b""
+        assert await one.words(1, 1) == bytes(2)
+        assert await other.assign("SETASG 1 2 R[1] 0")
+        assert await one.words(1, 2) == struct.pack("<f", 12.5)
 
 
-def test_positions_alarms_and_parts_of_values_are_assigned():
-    async def main():
-        async with simulator(faults=("fault",)) as port, client(port) as one:
-            for text in (
-                "SETASG 10001 50 POS[G1:0] 0.0",
-                "SETASG 10051 200 ALM[1] 1",
-                "SETASG 10251 12 POS[0]@27.12 0",
-                "SETASG 10263 26 $MNUTOOL[1,1]@1.26 0",
-                "SETASG 10289 100 ALM[E1] 1",
-                "SETASG 10389 18 PRG[2] 1",
-                "SETASG 10407 26 $MNUTOOL[1,2]@1.26 0",
-            ):
-                assert await one.assign(text), text
-            position = values.position(await one.words(10_001, 50))
-            assert position.cartesian.configuration == "N R U T, 0, 0, 0"
-            degrees = struct.unpack("<6f", await one.words(10_251, 12))
-            assert position.axes[:6] == degrees
-            home = [float(each) * 57.29577951308232 for each in joints_of(PUMA).home]
-            assert [*degrees] == pytest.approx([*home[:2], home[2] - home[1], *home[3:]], abs=1e-4)
-            (alarm,) = values.alarms(await one.words(10_051, 200))
-            assert (alarm.number, alarm.severity_name) == ("SRVO-001", "SERVO")
-            assert values.cartesian(await one.words(10_263, 26)) is not None
-            assert values.alarms(await one.words(10_289, 100)) == []
-            assert await one.words(10_389, 18) == bytes(36)
-            assert values.cartesian(await one.words(10_407, 26)) is None
-
-    run(main())
+async def test_positions_alarms_and_parts_of_values_are_assigned():
+    async with simulator(faults=("fault",)) as port, client(port) as one:
+        for text in (
+            "SETASG 10001 50 POS[G1:0] 0.0",
+            "SETASG 10051 200 ALM[1] 1",
+            "SETASG 10251 12 POS[0]@27.12 0",
+            "SETASG 10263 26 $MNUTOOL[1,1]@1.26 0",
+            "SETASG 10289 100 ALM[E1] 1",
+            "SETASG 10389 18 PRG[2] 1",
+            "SETASG 10407 26 $MNUTOOL[1,2]@1.26 0",
+        ):
+            assert await one.assign(text), text
+        position = values.position(await one.words(10_001, 50))
+        assert position.cartesian.configuration == "N R U T, 0, 0, 0"
+        degrees = struct.unpack("<6f", await one.words(10_251, 12))
+        assert position.axes[:6] == degrees
+        home = [float(each) * 57.29577951308232 for each in joints_of(PUMA).home]
+        assert [*degrees] == pytest.approx([*home[:2], home[2] - home[1], *home[3:]], abs=1e-4)
+        (alarm,) = values.alarms(await one.words(10_051, 200))
+        assert (alarm.number, alarm.severity_name) == ("SRVO-001", "SERVO")
+        assert values.cartesian(await one.words(10_263, 26)) is not None
+        assert values.alarms(await one.words(10_289, 100)) == []
+        assert await one.words(10_389, 18) == bytes(36)
+        assert values.cartesian(await one.words(10_407, 26)) is None
 
 
-def test_nothing_can_be_written_but_assignments():
-    async def main():
-        async with simulator() as port, client(port) as one:
-            for area in (0x08, 0x0A, 0x0C, 0x46, 0x48, 0x4C, 0x10):
-                assert await one.write(area, b"\1\0") == 0xD1
-            for text in (
-                "SETVAR $MCR.$GENOVERRIDE 10",
-                "CLRALM",
-                "SETASG 1 2",
-                "SETASG 0 2 R[1] 0",
-                "SETASG 16384 2 R[1] 0",
-                "SETASG 1 2 $RMT_MASTER 1",
-                "SETASG 1 50 POS[G2:0] 0",
-                "SETASG 1 2 R[1]@2.5 0",
-            ):
-                assert not await one.assign(text), text
-            for _ in range(79):
-                assert await one.assign("SETASG 12000 2 R[1] 0")
-            assert not await one.assign("SETASG 12000 2 R[1] 0")
-            assert await one.ask(Read(Area.WORDS, 16_383, 2)) is None
-
-    run(main())
+async def test_nothing_can_be_written_but_assignments():
+    async with simulator() as port, client(port) as one:
+        for area in (0x08, 0x0A, 0x0C, 0x46, 0x48, 0x4C, 0x10):
+            assert await one.write(area, b"\1\0") == 0xD1
+        for text in (
+            "SETVAR $MCR.$GENOVERRIDE 10",
+            "CLRALM",
+            "SETASG 1 2",
+            "SETASG 0 2 R[1] 0",
+            "SETASG 16384 2 R[1] 0",
+            "SETASG 1 2 $RMT_MASTER 1",
+            "SETASG 1 50 POS[G2:0] 0",
+            "SETASG 1 2 R[1]@2.5 0",
+        ):
+            assert not await one.assign(text), text
+        for _ in range(79):
+            assert await one.assign("SETASG 12000 2 R[1] 0")
+        assert not await one.assign("SETASG 12000 2 R[1] 0")
+        assert await one.ask(Read(Area.WORDS, 16_383, 2)) is None
 
 
-def test_a_fault_stops_the_arm_and_the_pendant_can_be_on():
-    async def main():
-        async with simulator(demo=True, faults=("fault@0.5+1", "local@2")) as port, client(port) as one:
-            first = await one.operator()
-            assert first >> Operator.PROGRAM_RUNNING & 1
-            assert first >> Operator.COMMANDS_ENABLED & 1
-            stopped = await one.until(lambda found: found >> Operator.FAULT & 1)
-            assert not stopped >> Operator.SYSTEM_READY & 1
-            await one.until(lambda found: found >> Operator.PROGRAM_RUNNING & 1)
-            local = await one.until(lambda found: found >> Operator.PENDANT_ENABLED & 1)
-            assert not local >> Operator.COMMANDS_ENABLED & 1
-
-    run(main())
+async def test_a_fault_stops_the_arm_and_the_pendant_can_be_on():
+    async with simulator(demo=True, faults=("fault@0.5+1", "local@2")) as port, client(port) as one:
+        first = await one.operator()
+        assert first >> Operator.PROGRAM_RUNNING & 1
+        assert first >> Operator.COMMANDS_ENABLED & 1
+        stopped = await one.until(lambda found: found >> Operator.FAULT & 1)
+        assert not stopped >> Operator.SYSTEM_READY & 1
+        await one.until(lambda found: found >> Operator.PROGRAM_RUNNING & 1)
+        local = await one.until(lambda found: found >> Operator.PENDANT_ENABLED & 1)
+        assert not local >> Operator.COMMANDS_ENABLED & 1
 
 
-def test_faults_of_the_answers_are_seen():
-    async def main():
-        async with simulator(faults=("mute",)) as port, client(port) as one:
-            assert await one.ask(OPERATOR) is None
-            assert await one.ask(Read(Area.ROBOT_INPUTS, 0, 8)) == b"\0"
-        async with simulator(faults=("busy",)) as port, client(port) as one:
-            answers = [await one.exchange(OPERATOR.encode(7)) for _ in range(4)]
-            assert {each[31:32] + each[42:44] for each in answers} == {b"\xd1\7\0", b"\xd4\0\0"}
-        async with simulator(faults=("flood",)) as port, client(port) as one:
-            one.writer.write(OPERATOR.encode(7))
-            assert len({await one.packet() for _ in range(50)}) == 1
-        async with simulator(faults=("burst",)) as port, client(port) as one:
-            begin_s = time.monotonic()
-            await one.ask(OPERATOR)
-            assert time.monotonic() - begin_s > 1.5
-        async with simulator(faults=("split", "joints", "jump")) as port, client(port) as one:
-            assert await one.assign("SETASG 10001 50 POS[G1:0] 0")
-            assert values.position(await one.words(10_001, 50)).axes[6] > 10
-
-    run(main())
+async def test_faults_of_the_answers_are_seen():
+    async with simulator(faults=("mute",)) as port, client(port) as one:
+        assert await one.ask(OPERATOR) is None
+        assert await one.ask(Read(Area.ROBOT_INPUTS, 0, 8)) == b"\0"
+    async with simulator(faults=("busy",)) as port, client(port) as one:
+        answers = [await one.exchange(OPERATOR.encode(7)) for _ in range(4)]
+        assert {each[31:32] + each[42:44] for each in answers} == {b"\xd1\7\0", b"\xd4\0\0"}
+    async with simulator(faults=("flood",)) as port, client(port) as one:
+        one.writer.write(OPERATOR.encode(7))
+        assert len({await one.packet() for _ in range(50)}) == 1
+    async with simulator(faults=("burst",)) as port, client(port) as one:
+        begin_s = time.monotonic()
+        await one.ask(OPERATOR)
+        assert time.monotonic() - begin_s > 1.5
+    async with simulator(faults=("split", "joints", "jump")) as port, client(port) as one:
+        assert await one.assign("SETASG 10001 50 POS[G1:0] 0")
+        assert values.position(await one.words(10_001, 50)).axes[6] > 10
 
 
-def test_a_fifth_client_and_bytes_that_are_no_packet_are_refused():
-    async def main():
-        async with simulator() as port, contextlib.AsyncExitStack() as stack:
-            for _ in range(4):
-                one = await stack.enter_async_context(client(port))
-            with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
-                async with client(port):
-                    pass
-            one.writer.write(b"\x16\3\1" + bytes(60))
-            assert await one.reader.read() == b""
+async def test_a_fifth_client_and_bytes_that_are_no_packet_are_refused():
+    async with simulator() as port, contextlib.AsyncExitStack() as stack:
+        for _ in range(4):
+            one = await stack.enter_async_context(client(port))
+        with pytest.raises((ConnectionError, asyncio.IncompleteReadError)):
+            async with client(port):
+                pass
+        one.writer.write(b"\x16\3\1" + bytes(60))
+        assert await one.reader.read() == b""
+        async with asyncio.timeout(20):
+            while True:
+                with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
+                    async with client(port):
+                        break
+
+
+async def test_a_refusing_and_a_restarting_controller_close_their_connections():
+    for fault in ("refuse", "restart", "drop"):
+        async with simulator(demo=True, faults=(f"{fault}@0.2+0.5",)) as port, client(port) as one:
+            with contextlib.suppress(ConnectionError):
+                assert await one.reader.read() == b""
             async with asyncio.timeout(20):
                 while True:
                     with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
-                        async with client(port):
+                        async with client(port) as later:
+                            found = await later.operator()
                             break
-
-    run(main())
-
-
-def test_a_refusing_and_a_restarting_controller_close_their_connections():
-    async def main():
-        for fault in ("refuse", "restart", "drop"):
-            async with simulator(demo=True, faults=(f"{fault}@0.2+0.5",)) as port, client(port) as one:
-                with contextlib.suppress(ConnectionError):
-                    assert await one.reader.read() == b""
-                async with asyncio.timeout(20):
-                    while True:
-                        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
-                            async with client(port) as later:
-                                found = await later.operator()
-                                break
-                running = bool(found >> Operator.PROGRAM_RUNNING & 1)
-                assert running is (fault != "restart")
-
-    run(main())
+            running = bool(found >> Operator.PROGRAM_RUNNING & 1)
+            assert running is (fault != "restart")
 
 
 def sample(controller, j23):
@@ -298,19 +273,16 @@ def test_a_wrong_relation_of_axis_3_is_found_and_named_by_a_comparison(j23):
     assert wrong.suspects == (f"elbow is its value {sign} that of shoulder",)
 
 
-def test_settings_that_cannot_be_used_are_refused():
-    async def main():
-        for options, error, text in (
-            ({"fanuc": FanucSettings(zero=(1.0,))}, SimulatorError, "has 1 values"),
-            ({"fanuc": FanucSettings(assignments="pendant", group=9)}, SimulatorError, "group 9"),
-            ({"faults": ("deaf",)}, FaultError, "deaf"),
-            ({"listen": "192.0.2.1:1"}, ListenError, "no TLS|cannot listen"),
-        ):
-            with pytest.raises(error, match=text):
-                async with simulator(**options):
-                    pass
-
-    run(main())
+async def test_settings_that_cannot_be_used_are_refused():
+    for options, error, text in (
+        ({"fanuc": FanucSettings(zero=(1.0,))}, SimulatorError, "has 1 values"),
+        ({"fanuc": FanucSettings(assignments="pendant", group=9)}, SimulatorError, "group 9"),
+        ({"faults": ("deaf",)}, FaultError, "deaf"),
+        ({"listen": "192.0.2.1:1"}, ListenError, "no TLS|cannot listen"),
+    ):
+        with pytest.raises(error, match=text):
+            async with simulator(**options):
+                pass
 
 
 def test_the_robot_interface_has_port_60008():

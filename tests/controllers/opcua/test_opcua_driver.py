@@ -27,7 +27,7 @@ from protocol_gateway.seam import (
 )
 from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robots.kinematics.joints import JointType
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, until
 
@@ -460,23 +460,20 @@ def readers():
 
 
 @pytest.mark.slow
-def test_gateway_shows_the_robot_and_survives_the_end_of_its_reader(mesh, tmp_path):
-    async def scenario():
-        async with controller(demo=True) as port, gateway(mesh, tmp_path, port, **OPC_UA) as site:
-            await until(lambda: len(site.seen.get("joints", [])) > 20)
-            assert site.controller.mode == STATE.REMOTE
-            await until(lambda: site.controller.activity == STATE.MOVING)
-            assert site.controller.counters.units_lost == 0
-            refused = await refusal(site.lease(A.ACQUIRE))
-            assert refused
-            (reader,) = readers()
-            reader.kill()
-            await until(lambda: site.controller.link != STATE.UP)
-            await until(lambda: site.controller.link == STATE.UP)
-            (again,) = readers()
-            assert again.pid != reader.pid
-            before = len(site.seen["joints"])
-            await until(lambda: len(site.seen["joints"]) > before + 5)
-        await until(lambda: not readers())
-
-    run(scenario())
+async def test_gateway_shows_the_robot_and_survives_the_end_of_its_reader(mesh, tmp_path):
+    async with controller(demo=True) as port, gateway(mesh, tmp_path, port, **OPC_UA) as site:
+        await until(lambda: len(site.seen.get("joints", [])) > 20)
+        assert site.controller.mode == STATE.REMOTE
+        await until(lambda: site.controller.activity == STATE.MOVING)
+        assert site.controller.counters.units_lost == 0
+        refused = await refusal(site.lease(A.ACQUIRE))
+        assert refused
+        (reader,) = readers()
+        reader.kill()
+        await until(lambda: site.controller.link != STATE.UP)
+        await until(lambda: site.controller.link == STATE.UP)
+        (again,) = readers()
+        assert again.pid != reader.pid
+        before = len(site.seen["joints"])
+        await until(lambda: len(site.seen["joints"]) > before + 5)
+    await until(lambda: not readers())

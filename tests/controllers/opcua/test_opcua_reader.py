@@ -169,27 +169,24 @@ def test_motion_device_of_the_companion_specification_is_read_and_nothing_is_wri
 
 
 @pytest.mark.slow
-def test_nodes_of_the_site_file_and_several_devices():
-    async def scenario():
-        async with companion_server(axes=1, devices=("Left", "Right")) as server:
-            port = server.port
-            assert "write device, one of Left, Right" in await ending(port)
-            assert "no motion device 'Middle'; it has Left, Right" in await ending(port, device="Middle")
-            node = server.nodes["position.1"].nodeid
-            mapped = f"nsu=http://opcfoundation.org/UA/Robotics/;i={node.Identifier}"
-            wrong = [OpcUaJoint(node="nsu=urn:absent;i=1", unit="deg")]
-            assert "no namespace urn:absent" in await ending(port, device="Left", joints=wrong)
-            absent = [OpcUaSignal(name="cell.absent", node="i=999999")]
-            signals = [*absent, OpcUaSignal(name="cell.position", node=mapped)]
-            joints = [OpcUaJoint(node=mapped, unit="deg")]
-            async with reading(port, device="Left", joints=joints, signals=signals) as (facts, task):
-                await until(lambda: task.done() or len(facts) > 1)
-                await server.set("position.1", 30.0)
-                await until(lambda: values_of(facts).get(("position", mapped)) == 30.0)
-                await until(lambda: values_of(facts).get(("declared", "cell.position")) == 30.0)
-                assert "it does not let be read: cell.absent: BadNodeIdUnknown" in facts[0].server
-
-    run(scenario())
+async def test_nodes_of_the_site_file_and_several_devices():
+    async with companion_server(axes=1, devices=("Left", "Right")) as server:
+        port = server.port
+        assert "write device, one of Left, Right" in await ending(port)
+        assert "no motion device 'Middle'; it has Left, Right" in await ending(port, device="Middle")
+        node = server.nodes["position.1"].nodeid
+        mapped = f"nsu=http://opcfoundation.org/UA/Robotics/;i={node.Identifier}"
+        wrong = [OpcUaJoint(node="nsu=urn:absent;i=1", unit="deg")]
+        assert "no namespace urn:absent" in await ending(port, device="Left", joints=wrong)
+        absent = [OpcUaSignal(name="cell.absent", node="i=999999")]
+        signals = [*absent, OpcUaSignal(name="cell.position", node=mapped)]
+        joints = [OpcUaJoint(node=mapped, unit="deg")]
+        async with reading(port, device="Left", joints=joints, signals=signals) as (facts, task):
+            await until(lambda: task.done() or len(facts) > 1)
+            await server.set("position.1", 30.0)
+            await until(lambda: values_of(facts).get(("position", mapped)) == 30.0)
+            await until(lambda: values_of(facts).get(("declared", "cell.position")) == 30.0)
+            assert "it does not let be read: cell.absent: BadNodeIdUnknown" in facts[0].server
 
 
 def own_certificate(folder):

@@ -79,100 +79,79 @@ async def client(port):
             await writer.wait_closed()
 
 
-def test_states_arrive_at_the_rate_with_a_running_clock():
-    async def main():
-        async with simulator() as port, client(port) as one:
-            first = await one.state(lambda *records: True)
-            begin_s = time.monotonic()
-            for _ in range(100):
-                last = await one.state(lambda *records: True)
-            assert time.monotonic() - begin_s > 0.9
-            assert last[3].seconds - first[3].seconds == pytest.approx(time.monotonic() - begin_s, abs=0.2)
-
-    run(main())
+async def test_states_arrive_at_the_rate_with_a_running_clock():
+    async with simulator() as port, client(port) as one:
+        first = await one.state(lambda *records: True)
+        begin_s = time.monotonic()
+        for _ in range(100):
+            last = await one.state(lambda *records: True)
+        assert time.monotonic() - begin_s > 0.9
+        assert last[3].seconds - first[3].seconds == pytest.approx(time.monotonic() - begin_s, abs=0.2)
 
 
-def test_every_client_sees_the_motion_that_one_of_them_commanded():
-    async def main():
-        async with simulator() as port, client(port) as one, client(port) as two:
-            one.send(b"2# COMMAND* trace; home&ABSOLUTE.DEG* 20.00; 60.00; - 40.00; 10.00; 90.00@")
+async def test_every_client_sees_the_motion_that_one_of_them_commanded():
+    async with simulator() as port, client(port) as one, client(port) as two:
+        one.send(b"2# COMMAND* trace; home&ABSOLUTE.DEG* 20.00; 60.00; - 40.00; 10.00; 90.00@")
 
-            def arrived(positions, velocities, status, clock):
-                return positions.values == TARGET and status.words == ("idle", "remote", "homed", "trace")
+        def arrived(positions, velocities, status, clock):
+            return positions.values == TARGET and status.words == ("idle", "remote", "homed", "trace")
 
-            await asyncio.gather(one.state(arrived), two.state(arrived))
-
-    run(main())
+        await asyncio.gather(one.state(arrived), two.state(arrived))
 
 
-def test_a_refused_unit_is_answered_to_its_sender():
-    async def main():
-        async with simulator() as port, client(port) as one:
-            one.send(b"2#COMMAND*stop@")
-            assert await one.error() == Error(2, "malformed, the count says 2 records, there are 1")
-            one.send(b"1#ABSOLUTE.DEG*0;0@")
-            assert await one.error() == Error(4, "2 values for 5 joints")
-            one.send(b"1#FORCE*1@")
-            assert (await one.error()).number == 3
-
-    run(main())
+async def test_a_refused_unit_is_answered_to_its_sender():
+    async with simulator() as port, client(port) as one:
+        one.send(b"2#COMMAND*stop@")
+        assert await one.error() == Error(2, "malformed, the count says 2 records, there are 1")
+        one.send(b"1#ABSOLUTE.DEG*0;0@")
+        assert await one.error() == Error(4, "2 values for 5 joints")
+        one.send(b"1#FORCE*1@")
+        assert (await one.error()).number == 3
 
 
-def test_type_codes_are_used_in_both_directions():
-    async def main():
-        codes = {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}
-        async with simulator(codes=codes) as port, client(port) as one:
-            unit = await one.next(lambda event: True)
-            assert unit.data.startswith(b"4#2*0.00;90.00;")
-            one.send(b"1#101@")
-            await one.state(lambda p, v, status, t: status.words[0] == "homing")
-
-    run(main())
+async def test_type_codes_are_used_in_both_directions():
+    codes = {2: "ABSOLUTE.DEG", 101: "COMMAND:home"}
+    async with simulator(codes=codes) as port, client(port) as one:
+        unit = await one.next(lambda event: True)
+        assert unit.data.startswith(b"4#2*0.00;90.00;")
+        one.send(b"1#101@")
+        await one.state(lambda p, v, status, t: status.words[0] == "homing")
 
 
-def test_a_client_past_the_maximum_gets_an_error_and_is_closed():
-    async def main():
-        async with simulator(max_clients=1) as port, client(port) as one:
-            await one.state(lambda *records: True)
-            async with client(port) as two:
-                assert await two.reader.read() == b"1#ERROR*1;too many clients@"
-            await one.state(lambda *records: True)
-
-    run(main())
+async def test_a_client_past_the_maximum_gets_an_error_and_is_closed():
+    async with simulator(max_clients=1) as port, client(port) as one:
+        await one.state(lambda *records: True)
+        async with client(port) as two:
+            assert await two.reader.read() == b"1#ERROR*1;too many clients@"
+        await one.state(lambda *records: True)
 
 
-def test_a_client_that_disconnects_makes_room_for_another():
-    async def main():
-        async with simulator(max_clients=1) as port:
-            for _ in range(3):
-                async with client(port) as one:
-                    await one.state(lambda *records: True)
-                await asyncio.sleep(0.05)
-
-    run(main())
+async def test_a_client_that_disconnects_makes_room_for_another():
+    async with simulator(max_clients=1) as port:
+        for _ in range(3):
+            async with client(port) as one:
+                await one.state(lambda *records: True)
+            await asyncio.sleep(0.05)
 
 
 @pytest.mark.slow
-def test_a_client_that_does_not_read_delays_no_other_and_is_closed():
-    async def main():
-        async with simulator(rate_hz=1000.0) as port, client(port) as quick:
-            with socket.socket() as slow:
-                slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-                slow.connect(("127.0.0.1", port))
-                begin_s = time.monotonic()
-                worst_s, last_s = 0.0, begin_s
-                while time.monotonic() - begin_s < 6.5:
-                    await quick.state(lambda *records: True)
-                    worst_s = max(worst_s, time.monotonic() - last_s)
-                    last_s = time.monotonic()
-                assert worst_s < 0.5
-                # Closed while unread data is still in its buffers.
-                slow.settimeout(30.0)
-                with contextlib.suppress(ConnectionError):
-                    while slow.recv(65536):
-                        pass
-
-    run(main())
+async def test_a_client_that_does_not_read_delays_no_other_and_is_closed():
+    async with simulator(rate_hz=1000.0) as port, client(port) as quick:
+        with socket.socket() as slow:
+            slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            slow.connect(("127.0.0.1", port))
+            begin_s = time.monotonic()
+            worst_s, last_s = 0.0, begin_s
+            while time.monotonic() - begin_s < 6.5:
+                await quick.state(lambda *records: True)
+                worst_s = max(worst_s, time.monotonic() - last_s)
+                last_s = time.monotonic()
+            assert worst_s < 0.5
+            # Closed while unread data is still in its buffers.
+            slow.settimeout(30.0)
+            with contextlib.suppress(ConnectionError):
+                while slow.recv(65536):
+                    pass
 
 
 def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
@@ -194,25 +173,19 @@ def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
     assert not [record for record in caplog.records if record.name == "asyncio"]
 
 
-def test_freeze_sends_nothing_and_keeps_the_socket_open():
-    async def main():
-        async with simulator(faults=("freeze@0.3",)) as port, client(port) as one:
-            await one.state(lambda *records: True)
-            with pytest.raises(TimeoutError):
-                await asyncio.wait_for(one.next(lambda event: False), 1.5)
-            one.send(b"1#COMMAND*stop@")
-
-    run(main())
+async def test_freeze_sends_nothing_and_keeps_the_socket_open():
+    async with simulator(faults=("freeze@0.3",)) as port, client(port) as one:
+        await one.state(lambda *records: True)
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(one.next(lambda event: False), 1.5)
+        one.send(b"1#COMMAND*stop@")
 
 
-def test_garbage_is_sent_between_valid_units():
-    async def main():
-        async with simulator(faults=("garbage",), rate_hz=500.0) as port, client(port) as one:
-            reasons = {(await one.next(lambda e: isinstance(e, Malformed))).reason for _ in range(20)}
-            assert len(reasons) >= 8
-            await one.state(lambda p, v, status, t: p.values == HOME)
-
-    run(main())
+async def test_garbage_is_sent_between_valid_units():
+    async with simulator(faults=("garbage",), rate_hz=500.0) as port, client(port) as one:
+        reasons = {(await one.next(lambda e: isinstance(e, Malformed))).reason for _ in range(20)}
+        assert len(reasons) >= 8
+        await one.state(lambda p, v, status, t: p.values == HOME)
 
 
 @pytest.mark.parametrize(
@@ -236,13 +209,10 @@ def test_invalid_settings_are_refused_in_one_line(options, error, text):
     assert "\n" not in str(caught.value)
 
 
-def test_a_port_in_use_is_refused_in_one_line():
-    async def main():
-        async with simulator() as port:
-            with pytest.raises(ListenError, match="address already in use"):
-                await serve(Settings(robot="pt600", listen=f"127.0.0.1:{port}"))
-
-    run(main())
+async def test_a_port_in_use_is_refused_in_one_line():
+    async with simulator() as port:
+        with pytest.raises(ListenError, match="address already in use"):
+            await serve(Settings(robot="pt600", listen=f"127.0.0.1:{port}"))
 
 
 @pytest.mark.parametrize(

@@ -333,65 +333,56 @@ def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path
     assert [numbers[f"tool.pose.{axis}"] for axis in "xyz"] == pytest.approx(tool[:3, 3], abs=1e-6)
 
 
-def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):
-    async def main():
-        async with (
-            controller(demo=True, faults=("fault@4",)) as (port, primary),
-            wire(port) as relay,
-            wire(primary) as of_primary,
-            gateway(mesh, tmp_path, relay.port, **UR, ports={"primary": of_primary.port}) as site,
-        ):
-            await until(lambda: site.controller.activity == STATE.MOVING)
-            assert site.controller.homed == STATE.YES
-            assert site.controller.mode == STATE.MODE_UNKNOWN
-            await site.units(50)
-            first, last = (site.seen["joints"][at] for at in (0, -1))
-            assert len(last.joints) == 6
-            assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
-            greeting = relay.data
-            assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
-            assert "Not sent" in await refusal(site.command(C.HOME))
-            # A stop is asked for, and is not sent: the answer says so.
-            answer = await site.stop(by="wang")
-            assert not answer.sent
-            await site.units(50)
-            assert relay.data == greeting
-            assert len(greeting) < 1000
-            alarm = await site.event("controller.alarm", -1)
-            assert alarm.values["number"] == "C153A0", alarm.text
-            await until(lambda: site.controller.activity == STATE.STOPPED)
-            assert not of_primary.sent
-
-    run(main())
+async def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_path):
+    async with (
+        controller(demo=True, faults=("fault@4",)) as (port, primary),
+        wire(port) as relay,
+        wire(primary) as of_primary,
+        gateway(mesh, tmp_path, relay.port, **UR, ports={"primary": of_primary.port}) as site,
+    ):
+        await until(lambda: site.controller.activity == STATE.MOVING)
+        assert site.controller.homed == STATE.YES
+        assert site.controller.mode == STATE.MODE_UNKNOWN
+        await site.units(50)
+        first, last = (site.seen["joints"][at] for at in (0, -1))
+        assert len(last.joints) == 6
+        assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
+        greeting = relay.data
+        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "Not sent" in await refusal(site.command(C.HOME))
+        # A stop is asked for, and is not sent: the answer says so.
+        answer = await site.stop(by="wang")
+        assert not answer.sent
+        await site.units(50)
+        assert relay.data == greeting
+        assert len(greeting) < 1000
+        alarm = await site.event("controller.alarm", -1)
+        assert alarm.values["number"] == "C153A0", alarm.text
+        await until(lambda: site.controller.activity == STATE.STOPPED)
+        assert not of_primary.sent
 
 
-def test_a_controller_that_restarts_is_shown_again(mesh, tmp_path):
-    async def main():
-        async with contextlib.AsyncExitStack() as before, contextlib.AsyncExitStack() as after:
-            port, primary = await before.enter_async_context(controller())
-            site = await after.enter_async_context(
-                gateway(mesh, tmp_path, port, **UR, ports={"primary": primary})
-            )
-            await before.aclose()
-            await until(lambda: site.controller.link == STATE.DOWN)
-            await site.event("link.channel_lost", -1)
-            addresses = {"listen": f"127.0.0.1:{port}", "primary": f"127.0.0.1:{primary}"}
-            await after.enter_async_context(controller(**addresses))
-            await until(lambda: site.controller.link == STATE.UP)
-            await site.event("link.channel_back", -1)
-
-    run(main())
+async def test_a_controller_that_restarts_is_shown_again(mesh, tmp_path):
+    async with contextlib.AsyncExitStack() as before, contextlib.AsyncExitStack() as after:
+        port, primary = await before.enter_async_context(controller())
+        site = await after.enter_async_context(
+            gateway(mesh, tmp_path, port, **UR, ports={"primary": primary})
+        )
+        await before.aclose()
+        await until(lambda: site.controller.link == STATE.DOWN)
+        await site.event("link.channel_lost", -1)
+        addresses = {"listen": f"127.0.0.1:{port}", "primary": f"127.0.0.1:{primary}"}
+        await after.enter_async_context(controller(**addresses))
+        await until(lambda: site.controller.link == STATE.UP)
+        await site.event("link.channel_back", -1)
 
 
-def test_without_its_alarms_a_controller_is_shown_and_a_port_of_no_interface_is_refused(mesh, tmp_path):
-    async def main():
-        async with controller() as (port, primary):
-            async with gateway(mesh, tmp_path / "a", port, **UR, ports={"primary": free_port()}) as site:
-                lost = await site.event("link.channel_lost", -1)
-                assert "primary" in lost.text
-                assert site.controller.link == STATE.UP
-            with pytest.raises(GatewaySettingsError, match=r"'primery'.*has .*'primary'"):
-                async with gateway(mesh, tmp_path / "b", port, **UR, ports={"primery": primary}):
-                    pass
-
-    run(main())
+async def test_without_its_alarms_a_controller_is_shown_and_a_port_of_no_interface_is_refused(mesh, tmp_path):
+    async with controller() as (port, primary):
+        async with gateway(mesh, tmp_path / "a", port, **UR, ports={"primary": free_port()}) as site:
+            lost = await site.event("link.channel_lost", -1)
+            assert "primary" in lost.text
+            assert site.controller.link == STATE.UP
+        with pytest.raises(GatewaySettingsError, match=r"'primery'.*has .*'primary'"):
+            async with gateway(mesh, tmp_path / "b", port, **UR, ports={"primery": primary}):
+                pass

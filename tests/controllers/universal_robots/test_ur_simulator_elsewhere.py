@@ -185,77 +185,62 @@ async def simulator(address, *, demo=True, faults=()):
         yield ports[:2]
 
 
-def test_ur_rtde_reads_states():
-    async def main():
-        async with simulator("127.0.31.1"):
-            names = ("ActualQ", "ActualQd", "RobotMode", "SafetyMode", "RuntimeState", "RobotStatus")
-            names += ("SafetyStatusBits", "JointMode", "ActualTCPPose", "Payload", "JointTemperatures")
-            read = await client_of("127.0.31.1", READ, *names)
-        assert not violations(joints_of(load("puma560")), read["ActualQ"])
-        assert (read["RobotMode"], read["SafetyMode"], read["RuntimeState"]) == (7, 1, 2)
-        assert (read["RobotStatus"], read["SafetyStatusBits"], read["JointMode"]) == (3, 1, [253] * 6)
-        assert len(read["ActualTCPPose"]) == 6
-        assert read["Payload"] == 1.2
-        assert all(24.0 <= each < 36.0 for each in read["JointTemperatures"])
-
-    run(main())
+async def test_ur_rtde_reads_states():
+    async with simulator("127.0.31.1"):
+        names = ("ActualQ", "ActualQd", "RobotMode", "SafetyMode", "RuntimeState", "RobotStatus")
+        names += ("SafetyStatusBits", "JointMode", "ActualTCPPose", "Payload", "JointTemperatures")
+        read = await client_of("127.0.31.1", READ, *names)
+    assert not violations(joints_of(load("puma560")), read["ActualQ"])
+    assert (read["RobotMode"], read["SafetyMode"], read["RuntimeState"]) == (7, 1, 2)
+    assert (read["RobotStatus"], read["SafetyStatusBits"], read["JointMode"]) == (3, 1, [253] * 6)
+    assert len(read["ActualTCPPose"]) == 6
+    assert read["Payload"] == 1.2
+    assert all(24.0 <= each < 36.0 for each in read["JointTemperatures"])
 
 
-def test_ur_rtde_and_the_gateway_s_driver_read_the_same_signals():
+async def test_ur_rtde_and_the_gateway_s_driver_read_the_same_signals():
     # What changes between two reads is compared by its range only.
     names = ("TargetMoment", "ActualCurrent", "JointTemperatures", "Payload", "PayloadCog", "ActualTCPForce")
     names += ("SpeedScaling", "TargetSpeedFraction", "RobotMode", "SafetyMode", "RuntimeState")
     names += ("StandardAnalogInput0", "StandardAnalogInput1", "StandardAnalogOutput0")
     names += ("ActualRobotVoltage", "ActualDigitalOutputBits", "ActualDigitalInputBits")
-
-    async def main():
-        async with simulator("127.0.31.3") as (rtde, _):
-            theirs = await client_of("127.0.31.3", READ, *names)
-            ours = await signals_of("127.0.31.3", rtde)
-        assert ours["payload.mass"] == theirs["Payload"] == 1.2
-        assert [ours[f"payload.{axis}"] for axis in "xyz"] == theirs["PayloadCog"]
-        assert [ours[f"tool.force.{axis}"] for axis in "xyz"] == theirs["ActualTCPForce"][:3]
-        assert ours["speed.scaling"] == 100 * theirs["SpeedScaling"]
-        assert ours["speed.override"] == 100 * theirs["TargetSpeedFraction"]
-        modes = [ours[name] for name in ("robot.mode", "safety.mode", "program.state")]
-        assert modes == ["running", "normal", "playing"]
-        assert [theirs[name] for name in ("RobotMode", "SafetyMode", "RuntimeState")] == [7, 1, 2]
-        assert ours["io.analog_in.0"] == theirs["StandardAnalogInput0"] == 2.5
-        assert ours["io.analog_in.1"] == theirs["StandardAnalogInput1"] == 0.012
-        assert ours["robot.voltage"] == theirs["ActualRobotVoltage"] == 48.0
-        assert theirs["ActualDigitalOutputBits"] == 0
-        assert not any(value for name, value in ours.items() if name.startswith("io.digital_out."))
-        for joint in range(6):
-            assert ours[f"joint.{joint}.temperature"] == pytest.approx(
-                theirs["JointTemperatures"][joint], abs=1
-            )
-            # What holds the arm is proportional to the motor's current, in both readers.
-            for moment, current in (
-                (ours[f"joint.{joint}.target_torque"], ours[f"joint.{joint}.current"]),
-                (theirs["TargetMoment"][joint], theirs["ActualCurrent"][joint]),
-            ):
-                assert 9.0 * abs(current) - 1e-9 <= abs(moment) <= 12.0 * abs(current) + 1e-9
-
-    run(main())
+    async with simulator("127.0.31.3") as (rtde, _):
+        theirs = await client_of("127.0.31.3", READ, *names)
+        ours = await signals_of("127.0.31.3", rtde)
+    assert ours["payload.mass"] == theirs["Payload"] == 1.2
+    assert [ours[f"payload.{axis}"] for axis in "xyz"] == theirs["PayloadCog"]
+    assert [ours[f"tool.force.{axis}"] for axis in "xyz"] == theirs["ActualTCPForce"][:3]
+    assert ours["speed.scaling"] == 100 * theirs["SpeedScaling"]
+    assert ours["speed.override"] == 100 * theirs["TargetSpeedFraction"]
+    modes = [ours[name] for name in ("robot.mode", "safety.mode", "program.state")]
+    assert modes == ["running", "normal", "playing"]
+    assert [theirs[name] for name in ("RobotMode", "SafetyMode", "RuntimeState")] == [7, 1, 2]
+    assert ours["io.analog_in.0"] == theirs["StandardAnalogInput0"] == 2.5
+    assert ours["io.analog_in.1"] == theirs["StandardAnalogInput1"] == 0.012
+    assert ours["robot.voltage"] == theirs["ActualRobotVoltage"] == 48.0
+    assert theirs["ActualDigitalOutputBits"] == 0
+    assert not any(value for name, value in ours.items() if name.startswith("io.digital_out."))
+    for joint in range(6):
+        assert ours[f"joint.{joint}.temperature"] == pytest.approx(theirs["JointTemperatures"][joint], abs=1)
+        # What holds the arm is proportional to the motor's current, in both readers.
+        for moment, current in (
+            (ours[f"joint.{joint}.target_torque"], ours[f"joint.{joint}.current"]),
+            (theirs["TargetMoment"][joint], theirs["ActualCurrent"][joint]),
+        ):
+            assert 9.0 * abs(current) - 1e-9 <= abs(moment) <= 12.0 * abs(current) + 1e-9
 
 
-def test_ur_rtde_writes_outputs_and_a_second_one_finds_them_in_use():
-    async def main():
-        async with simulator("127.0.31.2"):
-            assert "already in use" in await client_of("127.0.31.2", WRITE)
-
-    run(main())
+async def test_ur_rtde_writes_outputs_and_a_second_one_finds_them_in_use():
+    async with simulator("127.0.31.2"):
+        assert "already in use" in await client_of("127.0.31.2", WRITE)
 
 
-def test_program_of_ur_rtde_moves_and_stops_the_arm_and_its_watchdog_ends_it():
-    async def main():
-        async with simulator("127.0.31.5", demo=False):
-            target, there, stopped = await client_of("127.0.31.5", MOVE)
-        assert there == pytest.approx(target, abs=1e-9)
-        assert 0.2 <= stopped[0] - target[0] < 0.9
-        assert stopped[1:] == pytest.approx(target[1:], abs=1e-9)
-
-    run(main())
+async def test_program_of_ur_rtde_moves_and_stops_the_arm_and_its_watchdog_ends_it():
+    async with simulator("127.0.31.5", demo=False):
+        target, there, stopped = await client_of("127.0.31.5", MOVE)
+    assert there == pytest.approx(target, abs=1e-9)
+    assert 0.2 <= stopped[0] - target[0] < 0.9
+    assert stopped[1:] == pytest.approx(target[1:], abs=1e-9)
 
 
 def test_ur_rtde_moves_the_tool_on_a_line_at_a_speed_and_by_targets():

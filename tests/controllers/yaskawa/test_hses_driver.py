@@ -31,7 +31,6 @@ from protocol_gateway.seam import (
 from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robomesh import reason_codes as codes
 from robots.kinematics.joints import JointType
-from tests.conftest import run
 from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.wire import wire
@@ -430,76 +429,67 @@ def controller(**settings):
     return running(serve_hses, HsesSettings(**settings))
 
 
-def test_a_controller_with_hses_is_shown_and_only_reads_are_sent(mesh, tmp_path):
-    async def main():
-        async with (
-            controller(demo=True, faults=("fault@4",)) as port,
-            wire(port, datagrams=True) as relay,
-            gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
-        ):
-            await until(lambda: site.controller.activity == STATE.MOVING)
-            assert site.controller.mode == STATE.REMOTE
-            assert site.controller.homed == STATE.YES
-            await site.units(50)
-            first, last = (site.seen["joints"][at] for at in (0, -1))
-            assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
-            assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
-            assert "Not sent" in await refusal(site.command(C.HOME))
-            answer = await site.stop(by="wang")
-            assert not answer.sent
-            await until(lambda: any(each.values["number"] for each in site.events("controller.alarm")))
-            alarm = site.events("controller.alarm")[-1]
-            assert (alarm.values["number"], alarm.severity) == ("4107", alarm.ERROR)
-            await until(lambda: site.controller.activity == STATE.FAULT)
-            assert 0.0 < site.controller.health.stamp_uncertainty_s < 0.5
-            # Proven by a decode of all that was sent: reads without data.
-            found = {(*struct.unpack_from("<H", each, 24), each[29]) for each in relay.sent}
-            assert found == READS
-            assert {(len(each), each[:11], each[12:24], each[30:]) for each in relay.sent} == {
-                (32, b"YERC\x20\0\0\0\x03\x01\0", b"\0\0\0\x0099999999", b"\0\0")
-            }
-            assert site.controller.counters.units_sent <= len(relay.sent)
-
-    run(main())
+async def test_a_controller_with_hses_is_shown_and_only_reads_are_sent(mesh, tmp_path):
+    async with (
+        controller(demo=True, faults=("fault@4",)) as port,
+        wire(port, datagrams=True) as relay,
+        gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
+    ):
+        await until(lambda: site.controller.activity == STATE.MOVING)
+        assert site.controller.mode == STATE.REMOTE
+        assert site.controller.homed == STATE.YES
+        await site.units(50)
+        first, last = (site.seen["joints"][at] for at in (0, -1))
+        assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
+        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "Not sent" in await refusal(site.command(C.HOME))
+        answer = await site.stop(by="wang")
+        assert not answer.sent
+        await until(lambda: any(each.values["number"] for each in site.events("controller.alarm")))
+        alarm = site.events("controller.alarm")[-1]
+        assert (alarm.values["number"], alarm.severity) == ("4107", alarm.ERROR)
+        await until(lambda: site.controller.activity == STATE.FAULT)
+        assert 0.0 < site.controller.health.stamp_uncertainty_s < 0.5
+        # Proven by a decode of all that was sent: reads without data.
+        found = {(*struct.unpack_from("<H", each, 24), each[29]) for each in relay.sent}
+        assert found == READS
+        assert {(len(each), each[:11], each[12:24], each[30:]) for each in relay.sent} == {
+            (32, b"YERC\x20\0\0\0\x03\x01\0", b"\0\0\0\x0099999999", b"\0\0")
+        }
+        assert site.controller.counters.units_sent <= len(relay.sent)
 
 
-def test_lost_late_doubled_and_reordered_answers_give_no_joints_of_another_moment(mesh, tmp_path):
-    async def main():
-        kept = []
+async def test_lost_late_doubled_and_reordered_answers_give_no_joints_of_another_moment(mesh, tmp_path):
+    kept = []
 
-        def disturb(answer):
-            """Lose each seventh answer, double each fifth, and send each third once more later."""
-            kept.append(answer)
-            number = len(kept)
-            if number % 7 == 0:
-                return []
-            later = [kept[-3]] if number > 3 and number % 3 == 0 else []
-            return [*later, answer, *([answer] if number % 5 == 0 else []), *later]
+    def disturb(answer):
+        """Lose each seventh answer, double each fifth, and send each third once more later."""
+        kept.append(answer)
+        number = len(kept)
+        if number % 7 == 0:
+            return []
+        later = [kept[-3]] if number > 3 and number % 3 == 0 else []
+        return [*later, answer, *([answer] if number % 5 == 0 else []), *later]
 
-        async with (
-            controller(demo=True) as port,
-            wire(port, datagrams=True) as relay,
-            gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
-        ):
-            relay.answers = disturb
-            await until(lambda: site.controller.counters.units_lost >= 10)
-            seen = len(site.seen["joints"])
-            positions = sum(len(each) in (84,) for each in kept)
-            assert 0 < seen <= positions + 20
-            assert site.controller.counters.units_malformed == 0
-            assert site.controller.link == STATE.UP
-
-    run(main())
+    async with (
+        controller(demo=True) as port,
+        wire(port, datagrams=True) as relay,
+        gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
+    ):
+        relay.answers = disturb
+        await until(lambda: site.controller.counters.units_lost >= 10)
+        seen = len(site.seen["joints"])
+        positions = sum(len(each) in (84,) for each in kept)
+        assert 0 < seen <= positions + 20
+        assert site.controller.counters.units_malformed == 0
+        assert site.controller.link == STATE.UP
 
 
-def test_without_factors_the_robot_is_shown_without_joints_and_says_why(mesh, tmp_path):
-    async def main():
-        async with (
-            controller() as port,
-            gateway(mesh, tmp_path, port, **YASKAWA | {"options": None}) as site,
-        ):
-            await until(lambda: site.controller.activity == STATE.IDLE)
-            assert "declare pulses_per_degree" in site.controller.link_text
-            assert not site.seen["joints"]
-
-    run(main())
+async def test_without_factors_the_robot_is_shown_without_joints_and_says_why(mesh, tmp_path):
+    async with (
+        controller() as port,
+        gateway(mesh, tmp_path, port, **YASKAWA | {"options": None}) as site,
+    ):
+        await until(lambda: site.controller.activity == STATE.IDLE)
+        assert "declare pulses_per_degree" in site.controller.link_text
+        assert not site.seen["joints"]

@@ -118,97 +118,85 @@ async def output_of(*command):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("fs100") is None, reason="fs100 is not on the PYTHONPATH")
-def test_fs100_reads_the_simulated_controller():
-    async def main():
-        async with simulator(demo=True, faults=("fault@3",)) as port:
-            await asyncio.sleep(0)
-            found = json.loads((await output_of(sys.executable, "-c", READ, str(port))).splitlines()[-1])
-        assert (found["status"]["running"], found["status"]["servo_on"]) == (True, True)
-        assert (found["status"]["cmd_remote"], found["status"]["alarming"]) == (True, False)
-        assert found["job"]["job_name"] == "DEMO"
-        assert [*found["axes"].values()][:7] == [*"SLURBT", ""]
-        assert found["alarm"]["code"] == found["past"]["code"] == 0
-        assert found["position"]["data_type"] == 0
-        degrees = [each / 1000 for each in found["position"]["pos"][:6]]
-        assert not violations(PUMA, [each * 3.141592653589793 / 180 for each in degrees])
-        assert found["system"]["model"].startswith("PUMA560")
-        assert len(found["torque"]) == 7
-
-    run(main())
+async def test_fs100_reads_the_simulated_controller():
+    async with simulator(demo=True, faults=("fault@3",)) as port:
+        await asyncio.sleep(0)
+        found = json.loads((await output_of(sys.executable, "-c", READ, str(port))).splitlines()[-1])
+    assert (found["status"]["running"], found["status"]["servo_on"]) == (True, True)
+    assert (found["status"]["cmd_remote"], found["status"]["alarming"]) == (True, False)
+    assert found["job"]["job_name"] == "DEMO"
+    assert [*found["axes"].values()][:7] == [*"SLURBT", ""]
+    assert found["alarm"]["code"] == found["past"]["code"] == 0
+    assert found["position"]["data_type"] == 0
+    degrees = [each / 1000 for each in found["position"]["pos"][:6]]
+    assert not violations(PUMA, [each * 3.141592653589793 / 180 for each in degrees])
+    assert found["system"]["model"].startswith("PUMA560")
+    assert len(found["torque"]) == 7
 
 
 @pytest.mark.skipif(importlib.util.find_spec("yrcom") is None, reason="yrcom is not installed")
-def test_yrcom_moves_and_holds_the_simulated_controller():
-    async def main():
-        async with simulator() as port:
-            lines = (await output_of(sys.executable, "-c", MOVE, str(port))).splitlines()
-            found = json.loads(next(each for each in lines if each.startswith("{")))
-        assert {30000, -80000, 170000, 10000, 40000, 5000} <= {*found.values()}
-
-    run(main())
+async def test_yrcom_moves_and_holds_the_simulated_controller():
+    async with simulator() as port:
+        lines = (await output_of(sys.executable, "-c", MOVE, str(port))).splitlines()
+        found = json.loads(next(each for each in lines if each.startswith("{")))
+    assert {30000, -80000, 170000, 10000, 40000, 5000} <= {*found.values()}
 
 
 @pytest.mark.skipif(
     not CLIENT, reason="MOTO_HSES_EXAMPLES does not name a folder with moto-hses-client's examples"
 )
-def test_moto_hses_client_reads_the_simulated_controller():
-    async def main():
-        async with simulator(demo=True, faults=("fault",)) as port:
-            read = {
-                name: await output_of(f"{CLIENT}/{name}", "127.0.0.1", str(port))
-                for name in ("read_status", "position_operations", "alarm_operations")
-            }
-            held = await output_of(f"{CLIENT}/hold_servo_control", "127.0.0.1", str(port))
-        # As published the example switches the servos; with COMMAND_NAME = "hold" it sets and ends HOLD.
-        assert "to ON" in held
-        assert "Failed" not in held
-        assert "4107" in read["alarm_operations"]
-        assert "OUT OF RANGE" in read["alarm_operations"]
-        for text in (read["read_status"], read["position_operations"]):
-            assert "Failed" not in text
-
-    run(main())
+async def test_moto_hses_client_reads_the_simulated_controller():
+    async with simulator(demo=True, faults=("fault",)) as port:
+        read = {
+            name: await output_of(f"{CLIENT}/{name}", "127.0.0.1", str(port))
+            for name in ("read_status", "position_operations", "alarm_operations")
+        }
+        held = await output_of(f"{CLIENT}/hold_servo_control", "127.0.0.1", str(port))
+    # As published the example switches the servos; with COMMAND_NAME = "hold" it sets and ends HOLD.
+    assert "to ON" in held
+    assert "Failed" not in held
+    assert "4107" in read["alarm_operations"]
+    assert "OUT OF RANGE" in read["alarm_operations"]
+    for text in (read["read_status"], read["position_operations"]):
+        assert "Failed" not in text
 
 
 @pytest.mark.skipif(not MOCK, reason="MOTO_HSES_MOCK does not name moto-hses-mock's program")
-def test_moto_hses_mock_is_read():
-    async def main():
-        port, events = free_port(), []
-        mock = await asyncio.create_subprocess_exec(MOCK, "127.0.0.1", str(port), str(free_port()))
-        driver = HsesDriver(PUMA.types, {}, options=with_factors(YaskawaSettings(), 6))
-        link = ControllerLink(
-            LinkSettings(host="127.0.0.1", port=port),
-            driver,
-            endless_joints(6),
-            on_event=lambda event, _: events.append(event),
-        )
-        task = asyncio.create_task(link.run())
-        try:
-            await until(lambda: sum(isinstance(each, JointsReceived) for each in events) > 40)
-        finally:
-            task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
-            mock.terminate()
-            await mock.wait()
-        assert {each.positions for each in events if isinstance(each, JointsReceived)} == {(0.0,) * 6}
-        assert any(isinstance(each, StatusReceived) for each in events)
-        found = {
-            signal.name: value
-            for event in events
-            if isinstance(event, SignalsReceived)
-            for signal, value in event.values
-        }
-        assert (found["program.name"], found["program.line"], found["io.digital_in.1"]) == (
-            "TEST.JOB",
-            2,
-            True,
-        )
-        # Its names of axes are of eight bytes instead of four, and it answers the tool's pose in pulses.
-        malformed = {each.reason for each in events if isinstance(each, MalformedReceived)}
-        assert all("with 56 bytes" in each or "a tool's pose of type 0" in each for each in malformed)
-
-    run(main())
+async def test_moto_hses_mock_is_read():
+    port, events = free_port(), []
+    mock = await asyncio.create_subprocess_exec(MOCK, "127.0.0.1", str(port), str(free_port()))
+    driver = HsesDriver(PUMA.types, {}, options=with_factors(YaskawaSettings(), 6))
+    link = ControllerLink(
+        LinkSettings(host="127.0.0.1", port=port),
+        driver,
+        endless_joints(6),
+        on_event=lambda event, _: events.append(event),
+    )
+    task = asyncio.create_task(link.run())
+    try:
+        await until(lambda: sum(isinstance(each, JointsReceived) for each in events) > 40)
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        mock.terminate()
+        await mock.wait()
+    assert {each.positions for each in events if isinstance(each, JointsReceived)} == {(0.0,) * 6}
+    assert any(isinstance(each, StatusReceived) for each in events)
+    found = {
+        signal.name: value
+        for event in events
+        if isinstance(event, SignalsReceived)
+        for signal, value in event.values
+    }
+    assert (found["program.name"], found["program.line"], found["io.digital_in.1"]) == (
+        "TEST.JOB",
+        2,
+        True,
+    )
+    # Its names of axes are of eight bytes instead of four, and it answers the tool's pose in pulses.
+    malformed = {each.reason for each in events if isinstance(each, MalformedReceived)}
+    assert all("with 56 bytes" in each or "a tool's pose of type 0" in each for each in malformed)
 
 
 @pytest.mark.skipif(not MOCK, reason="MOTO_HSES_MOCK does not name moto-hses-mock's program")

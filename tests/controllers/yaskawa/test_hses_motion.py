@@ -64,36 +64,33 @@ async def until_reset(site, server):
     await resting(site)
 
 
-def test_targets_are_absolute_pulses_and_nothing_else_is_written(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            server.controller.tool = 3
-            await in_control(site)
-            before = positions(server)
-            await site.command(C.SPEED, speed_percent=50)
-            target = await move(site, 0.2)
-            await moving(site)
-            await resting(site)
-            assert positions(server) == pytest.approx(target, abs=2e-5)
-            await site.command(C.MOVE_RELATIVE, joint_positions=[-0.2, 0.1, 0, 0, 0, 0])
-            await moving(site)
-            await resting(site)
-            assert positions(server)[:2] == pytest.approx([before[0], before[1] + 0.1], abs=1e-4)
-            assert not site.controller.HasField("stop")
-            assert written(relay) == [(MOVE, 1, None)] * 2
-            first = motions(relay)[0]
-            assert (first[28], first[29], len(first)) == (1, 0x02, 32 + 88)
-            numbers = struct.unpack("<22i", first[32:])
-            pulses = [round(math.degrees(each) * 1000) for each in target]
-            assert numbers == (1, 0, 0, 5000, *pulses, 0, 0, 3, *[0] * 9)
-            for each in (C.HOME, C.HOLD, C.RESUME):
-                await refusal(site.command(each))
-            assert len(written(relay)) == 2
-
-    run(main())
+async def test_targets_are_absolute_pulses_and_nothing_else_is_written(mesh, tmp_path, monkeypatch):
+    async with (
+        controller(monkeypatch) as (port, server),
+        movable(mesh, tmp_path, port) as (site, relay),
+    ):
+        server.controller.tool = 3
+        await in_control(site)
+        before = positions(server)
+        await site.command(C.SPEED, speed_percent=50)
+        target = await move(site, 0.2)
+        await moving(site)
+        await resting(site)
+        assert positions(server) == pytest.approx(target, abs=2e-5)
+        await site.command(C.MOVE_RELATIVE, joint_positions=[-0.2, 0.1, 0, 0, 0, 0])
+        await moving(site)
+        await resting(site)
+        assert positions(server)[:2] == pytest.approx([before[0], before[1] + 0.1], abs=1e-4)
+        assert not site.controller.HasField("stop")
+        assert written(relay) == [(MOVE, 1, None)] * 2
+        first = motions(relay)[0]
+        assert (first[28], first[29], len(first)) == (1, 0x02, 32 + 88)
+        numbers = struct.unpack("<22i", first[32:])
+        pulses = [round(math.degrees(each) * 1000) for each in target]
+        assert numbers == (1, 0, 0, 5000, *pulses, 0, 0, 3, *[0] * 9)
+        for each in (C.HOME, C.HOLD, C.RESUME):
+            await refusal(site.command(each))
+        assert len(written(relay)) == 2
 
 
 def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, monkeypatch):
@@ -132,134 +129,118 @@ def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, monkey
     run(main(), timeout_s=90.0)
 
 
-def test_hold_is_set_again_while_the_stop_is_latched(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            lost = []
+async def test_hold_is_set_again_while_the_stop_is_latched(mesh, tmp_path, monkeypatch):
+    async with (
+        controller(monkeypatch) as (port, server),
+        movable(mesh, tmp_path, port) as (site, relay),
+    ):
+        await in_control(site)
+        lost = []
 
-            def loses_the_first(data):
-                if command(data) == HOLD and len(lost) < 4:
-                    lost.append(data)
-                    return []
-                return [data]
+        def loses_the_first(data):
+            if command(data) == HOLD and len(lost) < 4:
+                lost.append(data)
+                return []
+            return [data]
 
-            relay.commands = loses_the_first
-            await move(site, 2.0)
-            await until(lambda: moves(server))
-            await site.stop(by="wang")
-            await until(lambda: not moves(server))
-            await until(lambda: site.controller.activity == STATE.HOLDING)
-            assert len(lost) == 4
-            # Another client ends HOLD; each repetition has another number.
-            server.controller.hold(False, time.monotonic())
-            await until(lambda: server.controller._held)
-            numbers = [each[11] for each in relay.sent if command(each) == HOLD]
-            assert len({*numbers}) >= 4
-
-    run(main())
+        relay.commands = loses_the_first
+        await move(site, 2.0)
+        await until(lambda: moves(server))
+        await site.stop(by="wang")
+        await until(lambda: not moves(server))
+        await until(lambda: site.controller.activity == STATE.HOLDING)
+        assert len(lost) == 4
+        # Another client ends HOLD; each repetition has another number.
+        server.controller.hold(False, time.monotonic())
+        await until(lambda: server.controller._held)
+        numbers = [each[11] for each in relay.sent if command(each) == HOLD]
+        assert len({*numbers}) >= 4
 
 
-def test_a_refused_copy_of_a_motion_says_nothing_about_it(mesh, tmp_path, monkeypatch):
+async def test_a_refused_copy_of_a_motion_says_nothing_about_it(mesh, tmp_path, monkeypatch):
     """UDP may double the motion, and the refusal of the copy may overtake the answer of the motion."""
+    async with (
+        controller(monkeypatch) as (port, server),
+        movable(mesh, tmp_path, port) as (site, relay),
+    ):
+        await in_control(site)
+        kept = []
 
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
+        def overtaken(data):
+            if data[24] != 0x82:
+                return [data]
+            kept.append(data)
+            return kept[::-1] if len(kept) == 2 else []
+
+        relay.answers = overtaken
+        relay.commands = lambda data: [data, data]
+        target = await move(site, 0.3)
+        await moving(site)
+        await resting(site)
+        assert [each[25] for each in kept] == [0, 0x1F]
+        assert positions(server) == pytest.approx(target, abs=2e-5)
+        assert not site.controller.HasField("stop")
+        assert len(motions(relay)) == 1
+
+
+async def test_a_refused_motion_is_over_and_its_refusal_is_shown(mesh, tmp_path, monkeypatch):
+    async with (
+        controller(monkeypatch) as (port, server),
+        movable(mesh, tmp_path, port) as (site, relay),
+    ):
+        await in_control(site)
+        monkeypatch.setattr(server.controller, "move", lambda *given: Refusal.NOT_REMOTE)
+        await move(site, 0.3)
+        event = await site.event("controller.refused", -1)
+        assert "remote control by commands is off (status 0x1F, 0x2100)" in event.text
+        await resting(site)
+        assert not site.controller.HasField("stop")
+        monkeypatch.undo()
+        await site.lease(A.RENEW, ttl_s=5)
+        await move(site, 0.1)
+        await moving(site)
+        await resting(site)
+        assert len(motions(relay)) == 2
+
+
+async def test_a_late_answer_of_an_earlier_motion_says_nothing_about_a_later_one(mesh, tmp_path, monkeypatch):
+    async with (
+        controller(monkeypatch) as (port, _),
+        movable(mesh, tmp_path, port) as (site, relay),
+    ):
+        await in_control(site)
+        kept = []
+        relay.answers = lambda data: kept.append(data) or [] if data[24] == 0x82 else [data]
+        await move(site, 0.1)
+        await moving(site)
+        await resting(site)
+        # The second motion is lost, and answers of the first arrive in its place.
+        relay.commands = lambda data: [] if command(data) == MOVE else [data]
+        relay.answers = lambda data: [data, kept[0]] if data[24] == 0x81 else [data]
+        await move(site, 0.1)
+        await stopped_for(site, "hses.not_started")
+
+
+async def test_a_motion_is_refused_in_words(mesh, tmp_path, monkeypatch):
+    async with (
+        controller(monkeypatch) as (port, server),
+        movable(mesh, tmp_path, port) as (site, relay),
+    ):
+        await in_control(site)
+        arm, now = server.controller, time.monotonic
+        for text, begin, end in (
+            ("stopped", lambda: arm.switch_servos(False, now()), lambda: arm.switch_servos(True, now())),
+            ("hold", lambda: arm.press_hold(now()), lambda: setattr(arm, "held_at_pendant", False)),
+            ("fault", lambda: arm.raise_alarm(4315, 1, "COLLISION", now()), lambda: arm.reset(now())),
+            ("local", lambda: setattr(arm, "mode", Status1.PLAY), lambda: None),
         ):
-            await in_control(site)
-            kept = []
-
-            def overtaken(data):
-                if data[24] != 0x82:
-                    return [data]
-                kept.append(data)
-                return kept[::-1] if len(kept) == 2 else []
-
-            relay.answers = overtaken
-            relay.commands = lambda data: [data, data]
-            target = await move(site, 0.3)
-            await moving(site)
-            await resting(site)
-            assert [each[25] for each in kept] == [0, 0x1F]
-            assert positions(server) == pytest.approx(target, abs=2e-5)
-            assert not site.controller.HasField("stop")
-            assert len(motions(relay)) == 1
-
-    run(main())
-
-
-def test_a_refused_motion_is_over_and_its_refusal_is_shown(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            monkeypatch.setattr(server.controller, "move", lambda *given: Refusal.NOT_REMOTE)
-            await move(site, 0.3)
-            event = await site.event("controller.refused", -1)
-            assert "remote control by commands is off (status 0x1F, 0x2100)" in event.text
-            await resting(site)
-            assert not site.controller.HasField("stop")
-            monkeypatch.undo()
+            begin()
+            await site.units(20)
             await site.lease(A.RENEW, ttl_s=5)
-            await move(site, 0.1)
-            await moving(site)
+            assert text in (await refusal(move(site, 0.1))).lower()
+            end()
             await resting(site)
-            assert len(motions(relay)) == 2
-
-    run(main())
-
-
-def test_a_late_answer_of_an_earlier_motion_says_nothing_about_a_later_one(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, _),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            kept = []
-            relay.answers = lambda data: kept.append(data) or [] if data[24] == 0x82 else [data]
-            await move(site, 0.1)
-            await moving(site)
-            await resting(site)
-            # The second motion is lost, and answers of the first arrive in its place.
-            relay.commands = lambda data: [] if command(data) == MOVE else [data]
-            relay.answers = lambda data: [data, kept[0]] if data[24] == 0x81 else [data]
-            await move(site, 0.1)
-            await stopped_for(site, "hses.not_started")
-
-    run(main())
-
-
-def test_a_motion_is_refused_in_words(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            controller(monkeypatch) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            arm, now = server.controller, time.monotonic
-            for text, begin, end in (
-                ("stopped", lambda: arm.switch_servos(False, now()), lambda: arm.switch_servos(True, now())),
-                ("hold", lambda: arm.press_hold(now()), lambda: setattr(arm, "held_at_pendant", False)),
-                ("fault", lambda: arm.raise_alarm(4315, 1, "COLLISION", now()), lambda: arm.reset(now())),
-                ("local", lambda: setattr(arm, "mode", Status1.PLAY), lambda: None),
-            ):
-                begin()
-                await site.units(20)
-                await site.lease(A.RENEW, ttl_s=5)
-                assert text in (await refusal(move(site, 0.1))).lower()
-                end()
-                await resting(site)
-            assert not written(relay)
-
-    run(main())
+        assert not written(relay)
 
 
 def test_the_site_file_must_say_how_many_pulses_and_which_robot():

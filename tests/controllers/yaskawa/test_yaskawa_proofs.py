@@ -11,7 +11,6 @@ from robots.kinematics.joints import joints_of
 from robots.kinematics.model import build_model, link_placements
 from robots.kinematics.verification import POSES, Sample, verify
 from robots.schema.poses import axis_rotation
-from tests.conftest import run
 from tests.controllers.yaskawa.test_hses_driver import YASKAWA, controller
 from tests.protocol_gateway.gateway_site import STATE, gateway, until
 from tests.protocol_gateway.test_controller_proofs import ARM, RECORD
@@ -56,31 +55,28 @@ def test_the_pose_of_a_yaskawa_shows_whether_its_declared_pulses_are_right():
     assert data.DataType.ROBOT == 17
 
 
-def test_unproven_joints_are_shown_and_count_for_no_check(mesh, tmp_path):
-    async def main():
-        async with controller(demo=True) as port:
-            async with gateway(mesh, tmp_path, port, **YASKAWA) as site:
-                await until(lambda: site.controller.software)
-                assert site.controller.joints_unproven
-                assert "robomesh robot verify hall/arm --out FILE" in site.controller.link_text
-                await site.units(10)
-                assert site.controller.software.startswith("SIM1.00")
-                assert len(site.events("controller.software")) == 1
-                sha256, software = site.controller.joints_sha256, site.controller.software
-            record = RECORD.model_copy(update={"joints_sha256": sha256, "software": software})
-            async with gateway(mesh, tmp_path, port, verified=record, **YASKAWA) as site:
-                await until(lambda: site.controller.software and not site.controller.joints_unproven)
-                assert site.controller.link == STATE.UP
-                assert "unproven" not in site.controller.link_text
-            older = record.model_copy(update={"software": "SIM0.99"})
-            async with gateway(mesh, tmp_path, port, verified=older, **YASKAWA) as site:
-                await until(lambda: "SIM0.99" in site.controller.link_text and site.controller.software)
-                assert site.controller.joints_unproven
-
-    run(main())
+async def test_unproven_joints_are_shown_and_count_for_no_check(mesh, tmp_path):
+    async with controller(demo=True) as port:
+        async with gateway(mesh, tmp_path, port, **YASKAWA) as site:
+            await until(lambda: site.controller.software)
+            assert site.controller.joints_unproven
+            assert "robomesh robot verify hall/arm --out FILE" in site.controller.link_text
+            await site.units(10)
+            assert site.controller.software.startswith("SIM1.00")
+            assert len(site.events("controller.software")) == 1
+            sha256, software = site.controller.joints_sha256, site.controller.software
+        record = RECORD.model_copy(update={"joints_sha256": sha256, "software": software})
+        async with gateway(mesh, tmp_path, port, verified=record, **YASKAWA) as site:
+            await until(lambda: site.controller.software and not site.controller.joints_unproven)
+            assert site.controller.link == STATE.UP
+            assert "unproven" not in site.controller.link_text
+        older = record.model_copy(update={"software": "SIM0.99"})
+        async with gateway(mesh, tmp_path, port, verified=older, **YASKAWA) as site:
+            await until(lambda: "SIM0.99" in site.controller.link_text and site.controller.software)
+            assert site.controller.joints_unproven
 
 
-def test_unproven_joints_that_cannot_be_are_published_and_marked(mesh, tmp_path):
+async def test_unproven_joints_that_cannot_be_are_published_and_marked(mesh, tmp_path):
     """As with a wrong factor in the site file: `robot verify` shows which joint is wrong."""
 
     def elsewhere(data):
@@ -88,24 +84,21 @@ def test_unproven_joints_that_cannot_be_are_published_and_marked(mesh, tmp_path)
         positions = len(data) == 84 and data[32:36] == bytes(4)
         return [data[:55] + b"\x40" + data[56:] if positions else data]
 
-    async def main():
-        async with (
-            controller() as port,
-            wire(port, datagrams=True) as relay,
-            gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
-        ):
-            await until(lambda: site.controller.joints_unproven and site.joints)
-            assert "cannot be right" not in site.controller.link_text
-            relay.answers = elsewhere
-            await until(lambda: abs(site.joints[0]) > 1000.0)
-            await until(lambda: "its joints cannot be right (joint waist at" in site.controller.link_text)
-            assert site.controller.link == STATE.UP
-            assert site.controller.joints_unproven
-            assert [each.code for each in site.controller.link_reasons][1:3] == [
-                "joints.not_verified",
-                "joints.invalid",
-            ]
-            relay.answers = lambda data: [data]
-            await until(lambda: "cannot be right" not in site.controller.link_text)
-
-    run(main())
+    async with (
+        controller() as port,
+        wire(port, datagrams=True) as relay,
+        gateway(mesh, tmp_path, relay.port, **YASKAWA) as site,
+    ):
+        await until(lambda: site.controller.joints_unproven and site.joints)
+        assert "cannot be right" not in site.controller.link_text
+        relay.answers = elsewhere
+        await until(lambda: abs(site.joints[0]) > 1000.0)
+        await until(lambda: "its joints cannot be right (joint waist at" in site.controller.link_text)
+        assert site.controller.link == STATE.UP
+        assert site.controller.joints_unproven
+        assert [each.code for each in site.controller.link_reasons][1:3] == [
+            "joints.not_verified",
+            "joints.invalid",
+        ]
+        relay.answers = lambda data: [data]
+        await until(lambda: "cannot be right" not in site.controller.link_text)
