@@ -57,7 +57,7 @@ export function ToolPanel(props: {
             {...(steps && { minus: steps.button(axis, -1), plus: steps.button(axis, 1) })}
           />
         ))}
-        <NumberRow label={t("tool_speed")} text={fixed(speed, 1)} unit="mm/s" />
+        <NumberRow label={t("speed")} text={fixed(speed, 1)} unit="mm/s" />
         <NumberRow label={t("manipulability")} text={fixed(state?.manipulability, 4)} unit="" />
       </dl>
       {steps?.notice}

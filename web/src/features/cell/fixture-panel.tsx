@@ -96,7 +96,7 @@ function Shape({ fixture, set }: { fixture: CellFixture; set: (edit: (fixture: C
           />
           <NumberField
             key={`${name} height`}
-            label={c("cylinder_height")}
+            label={c("height")}
             quantity="length"
             positive
             value={shape.value.height}

@@ -65,7 +65,7 @@ function enqueue(read: () => Promise<void>): Promise<void> {
     try {
       await read();
     } catch (error) {
-      notice("refused", d("failed", { text: errorText(error) }));
+      notice("refused", d("not_done", { text: errorText(error) }));
     }
     reading.value = "";
   });

@@ -60,8 +60,8 @@ function JointDetails({ joint, index, description }: { joint: Joint; index: numb
           set={(name) => editDraft((now) => renameJoint(now.description, index, name), `${path}/name`)}
         />
         <NumberField path={`${path}/home`} label={d("home")} unit={unit} />
-        <TextField path={`${path}/title`} label={d("joint_title")} />
-        <TextField path={`${path}/title_zh`} label={d("joint_title_zh")} />
+        <TextField path={`${path}/title`} label={d("title")} />
+        <TextField path={`${path}/title_zh`} label={d("title_zh")} />
         <NumberField path={`${path}/max_jerk`} label={d("max_jerk")} unit={`${unit}/s³`} step={10} />
       </div>
       {["name", "title", "title_zh", "type", "home", "max_jerk"].map((key) => (

@@ -25,7 +25,7 @@ export async function listRobots(): Promise<void> {
   try {
     knownRobots.value = await server.robots();
   } catch (error) {
-    outcome.value = { kind: "refused", text: d("failed", { text: errorText(error) }) };
+    outcome.value = { kind: "refused", text: d("not_done", { text: errorText(error) }) };
   }
 }
 
@@ -40,7 +40,7 @@ async function perform<T>(what: string, work: () => Promise<T>): Promise<T | und
   try {
     return await work();
   } catch (error) {
-    outcome.value = { kind: "refused", text: d("failed", { text: errorText(error) }) };
+    outcome.value = { kind: "refused", text: d("not_done", { text: errorText(error) }) };
     return undefined;
   } finally {
     busy.value = "";

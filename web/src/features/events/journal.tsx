@@ -161,7 +161,7 @@ export function Journal() {
           label={e("robot")}
           value={kind === "day" ? (dayKey?.split("/")[2] ?? "") : robot}
           values={kind === "day" ? names : ["", "-", ...names]}
-          text={(name) => (name === "-" ? e("whole_site") : name || e("every_robot"))}
+          text={(name) => (name === "-" ? e("whole_site") : name || e("all_robots"))}
           choose={setRobot}
         />
         {kind !== "day" && (

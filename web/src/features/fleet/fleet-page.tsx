@@ -111,7 +111,7 @@ function Filter({ sites }: { sites: readonly string[] }) {
         />
       )}
       <Select label={f("state")} value={state.value} values={STATES} text={f} choose={(name) => (state.value = name)} />
-      <Select label={f("sort")} value={order.value} values={ORDERS} text={f} choose={(name) => (order.value = name)} />
+      <Select label={f("order")} value={order.value} values={ORDERS} text={f} choose={(name) => (order.value = name)} />
       <TextInput type="search" hint={t("filter")} value={text.value} set={(typed) => (text.value = typed)} />
     </div>
   );

@@ -71,7 +71,7 @@ export function PointList({ tell }: { tell: (words: Words) => void }) {
           <Button
             quiet
             text={p("delete")}
-            aria-label={p("delete_point", { name: point.name })}
+            aria-label={p("delete_of", { name: point.name })}
             onClick={() => remove(point)}
           />
         </li>

@@ -60,7 +60,7 @@ export function Versions(props: {
       )}
       {form === "delete" && (
         <ReasonForm
-          title={s("delete_title", { name: title })}
+          title={s("delete_of", { name: title })}
           text={s("delete_words")}
           does={s("delete")}
           required

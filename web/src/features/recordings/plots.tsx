@@ -83,7 +83,7 @@ export function Plots(props: {
             {r("save_picture")}
           </button>
           <Toggle on={choosing} set={setChoosing}>
-            {r(choosing ? "values_done" : "values")}
+            {r(choosing ? "done" : "values")}
           </Toggle>
         </>
       }

@@ -162,7 +162,7 @@ function Stop({ row, name }: { row: Row; name: string }) {
       await askRecorder(`robomesh/${row.site}/${row.recording.robot}`, Action.TRACE_OFF);
       refreshSite(row.site);
     } catch (error) {
-      setProblem(r("record_refused", { text: reasonOf(error) }));
+      setProblem(r("not_done", { text: reasonOf(error) }));
     }
     setBusy(false);
   };

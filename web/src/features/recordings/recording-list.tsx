@@ -58,7 +58,7 @@ export function RecordingList() {
             label={r("robot")}
             value={robot.value}
             values={[EVERY, ...robots]}
-            text={(name) => name || r("every_robot")}
+            text={(name) => name || r("all_robots")}
             choose={(name) => (robot.value = name)}
           />
           {(tags.length > 0 || tag.value !== EVERY) && (

@@ -71,7 +71,7 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
     } catch (error) {
       setNotice({
         kind: "refused",
-        text: r("record_refused", { text: reasonOf(error) }),
+        text: r("not_done", { text: reasonOf(error) }),
       });
     }
   };

@@ -89,7 +89,7 @@ export function SavedLayouts(props: { site: string; text: string }) {
         />
       </span>
       <label>
-        <span>{p("layout_name")}</span>
+        <span>{p("name")}</span>
         <TextInput
           maxLength={LONGEST_NAME}
           value={name}
@@ -107,7 +107,7 @@ export function SavedLayouts(props: { site: string; text: string }) {
         disabled={!able || there?.text === text}
       />
       <Button
-        text={p("rename_layout")}
+        text={p("rename")}
         type="button"
         title={cannot}
         disabled={!able || !opened || wanted === chosen || (there !== undefined && there !== opened)}

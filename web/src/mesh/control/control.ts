@@ -203,7 +203,7 @@ export async function offer(to: string | null): Promise<void> {
   state.offeredTo = to ?? "";
   const values = { lease: mine.lease, to: to ?? mine.operator };
   const done = to ? t("offered", { name: to }) : t("withdrawn");
-  await say(mine.robotKey, mine.operator, Action.OFFER, values, done, "not_offered");
+  await say(mine.robotKey, mine.operator, Action.OFFER, values, done, "not_done");
 }
 
 async function say(
