@@ -124,6 +124,8 @@ def _signature(function: Any) -> str:
     tree = _tree(function)
     tree.args.args = [each for each in tree.args.args if each.arg != "self"]
     returns = _plain(tree.returns)
+    if not inspect.iscoroutinefunction(function) and hasattr(function, "__wrapped__"):
+        returns = returns.replace("AsyncStream", "Stream")  # the blocking form
     return f"({_plain(tree.args)})" + ("" if returns in ("None", "") else f" -> {returns}")
 
 

@@ -210,7 +210,8 @@ class AsyncArm:
         Args:
             axis: "x", "y", "z", "roll", "pitch" or "yaw" (about x, y, z); or a joint's number, from 1.
             speed: The greatest speed [m/s] or [rad/s]; negative: in the other direction.
-            held: Returns whether the operator still holds the button down.
+            held: Returns whether the operator still holds the button down; a blocking arm calls it on another
+                thread.
             frame: "tool", "base" or "site"; not used for a joint.
 
         Raises:
