@@ -19,7 +19,7 @@ from robomesh import reason_codes as codes
 from robomesh.contract.topics import check_operator
 from robomesh.errors import KeyNameError, RefusedError
 from robomesh.reasons import Reason
-from robomesh.requests.server import Answerer, Handler, Request
+from robomesh.requests.server import Handler, Request, RequestServer
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.texts import one_line
 from robomesh.wire.session import Session
@@ -51,11 +51,11 @@ class MeshRequests:
             site, robot, "stop", self._answer_stop, recall=control.answer_to_repeated_stop
         )
 
-        def answer(name: str, handler: Handler, what: str) -> Answerer:
+        def answer(name: str, handler: Handler, what: str) -> RequestServer:
             refused = partial(self._record_refused, what)
             return session.answer(site, robot, name, handler, on_refused=refused)
 
-        self._answerers = (
+        self._servers = (
             answer("lease/request/*", self._answer_lease, _LEASE),
             answer("command/*", self._answer_command, _COMMAND),
             answer("jog/*", self._answer_keep_alive, _JOG),
@@ -64,7 +64,7 @@ class MeshRequests:
 
     def close(self) -> None:
         """Stop answering."""
-        for each in (self._stops, *self._answerers):
+        for each in (self._stops, *self._servers):
             each.close()
 
     def record_counted(self) -> None:
@@ -74,7 +74,7 @@ class MeshRequests:
             assert isinstance(answer, schema.StopAnswer)
             by, reason = _by_and_reason(newest)
             self._control.record_repeated_stops(count, answer.stop_id, by=by, reason=reason, source=MESH)
-        turned_away = sum(each.turned_away for each in (self._stops, *self._answerers))
+        turned_away = sum(each.turned_away for each in (self._stops, *self._servers))
         if more := turned_away - self._turned_away:
             self._turned_away = turned_away
             self._record_refused("REQUESTS", "", codes.TURNED_AWAY(), repeated=more - 1)

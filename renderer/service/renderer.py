@@ -31,7 +31,7 @@ from robomesh import reason_codes as codes
 from robomesh.contract.keys import CLOSE, FAR, FREE, WHOLE_SITE
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quota, Quotas
 from robomesh.errors import RefusedError
-from robomesh.requests.server import Answerer, Request
+from robomesh.requests.server import Request, RequestServer
 from robomesh.schemas.robomesh_pb2 import Event, KeyFrameAnswer, ViewAnswer, ViewRequest
 from robomesh.wire.session import Session
 
@@ -138,7 +138,7 @@ class _Renderer:
         )
         # By robot and view.
         self._streams: dict[tuple[str, str], Stream] = {}
-        self._answerers: dict[str, list[Answerer]] = {}
+        self._servers: dict[str, list[RequestServer]] = {}
         self._active: set[Stream] = set()
         # None: to be found again.
         self._shown: frozenset[str] | None = frozenset()
@@ -181,7 +181,7 @@ class _Renderer:
 
     def on_ready(self, state: RobotState) -> None:
         self._shown = None  # its cell may be another
-        if state.name in self._answerers:
+        if state.name in self._servers:
             return  # the description has changed: its streams continue
         appearance, settings = state.appearance, self._settings
         assert appearance is not None
@@ -195,7 +195,7 @@ class _Renderer:
             names.append(name)
             self._open(state, standard_view(name, size=settings.size, fps=settings.fps))
         self._open(state, low_rate_view(self._first_view(state), size=settings.size, fps=settings.fps))
-        self._answerers[state.name] = [
+        self._servers[state.name] = [
             self._session.answer(
                 state.site, state.name, "video/*/keyframe/*", partial(self._answer_key_frame, state)
             ),
@@ -209,8 +209,8 @@ class _Renderer:
 
     def on_removed(self, state: RobotState) -> None:
         self._shown = None
-        for answerer in self._answerers.pop(state.name, ()):
-            answerer.close()
+        for server in self._servers.pop(state.name, ()):
+            server.close()
         for key in [key for key in self._streams if key[0] == state.name]:
             self._close(key)
 

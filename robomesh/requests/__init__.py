@@ -1,1 +1,1 @@
-"""Requests and their answers: pieces, queues, refusals, times."""
+"""Requests and their answers: client, server, queues, chunked replies, refusals, times."""

@@ -23,7 +23,7 @@ from robomesh.errors import (
     RobomeshError,
 )
 from robomesh.reasons import Reason, pairs_of, reason_of
-from robomesh.requests import pieces
+from robomesh.requests import chunked_replies
 from robomesh.requests.replies import query
 from robomesh.requests.server import AGAIN_S, BUSY, CODES, MARK_BYTES, OLD_AGAIN_S, WITHIN
 
@@ -51,7 +51,7 @@ async def ask_all(
 
     Args:
         timeout_s: Time for the owners to answer [s].
-        silent_s: Longest gap between the pieces of a long answer [s]; None: `timeout_s`.
+        silent_s: Longest gap between the chunks of a long answer [s]; None: `timeout_s`.
     """
     row, asked = topics.request(key.topic), str(key)
     if row.priority in ON_THE_SECOND_LINK:
@@ -68,18 +68,18 @@ async def ask_all(
     silent_s = timeout_s if silent_s is None else silent_s
     found: list[tuple[str, bytes | None, RefusedError | BrokenAnswerError | None]] = []
     for owner, answer, refused in answers:
-        if not isinstance(answer, pieces.First):
+        if not isinstance(answer, chunked_replies.FirstChunk):
             found.append((owner, answer, refused))
             continue
         try:
-            whole = await pieces.whole(session, answer, row.priority, timeout_s=silent_s)
+            whole = await chunked_replies.fetch_whole(session, answer, row.priority, timeout_s=silent_s)
             found.append((owner, whole, None))
         except BrokenAnswerError as error:
             found.append((owner, None, error))
     return found
 
 
-_Answer = tuple[str, bytes | pieces.First | None, RefusedError | None]
+_Answer = tuple[str, bytes | chunked_replies.FirstChunk | None, RefusedError | None]
 
 
 def _query(
@@ -97,14 +97,18 @@ def _query(
             # Zenoh checks that the key matches the request's.
             if keys.has_wildcard(str(reply.ok.key_expr)):
                 return None
-            return str(reply.ok.key_expr), pieces.first_of(reply.ok) or reply.ok.payload.to_bytes(), None
+            return (
+                str(reply.ok.key_expr),
+                chunked_replies.first_chunk(reply.ok) or reply.ok.payload.to_bytes(),
+                None,
+            )
         if reply.err is not None and (encoding := str(reply.err.encoding)).startswith(TEXT):
             return key, None, _refused(reply.err.payload.to_bytes(), encoding)
         return None
 
     return query(
         session,
-        f"{pieces.selector(key)};{WITHIN}={timeout_s:.3f};{CODES}",
+        f"{chunked_replies.selector(key)};{WITHIN}={timeout_s:.3f};{CODES}",
         read,
         priority=priority,
         timeout_s=timeout_s,

@@ -20,7 +20,7 @@ from robomesh.contract.ignored import REQUEST, Ignored
 from robomesh.contract.messages import JSON, PROTOBUF, TEXT, decode_request, encode, is_json
 from robomesh.errors import BusyError, KeyNameError, MessageError, QuotaError, RefusedError
 from robomesh.reasons import RETRY, Reason, to_parameters
-from robomesh.requests import pieces
+from robomesh.requests import chunked_replies
 from robomesh.requests.latencies import Latencies
 from robomesh.requests.request_queue import RING, Queue, RateLimit, RoundRobin, begin_now, paced, read
 
@@ -98,7 +98,7 @@ OnRefused = Callable[[str, Reason], None]
 Recall = Callable[[], Message | None]
 
 
-class Answerer:
+class RequestServer:
     """The owner of one request: answers it with a coroutine on the event loop.
 
     Limits the waiting requests in all and for each caller: a flooding caller gets an error, takes no other
@@ -142,7 +142,7 @@ class Answerer:
         self._tasks: set[asyncio.Task[None]] = set()
         # Answers by the mark on both copies of a request; None: the first copy waits for the loop.
         self._begun: dict[bytes, asyncio.Future[Message | bytes] | Message | None] = {}
-        self._long = pieces.LongAnswers(in_name=self._row.in_name)
+        self._chunked = chunked_replies.ChunkedReplies(in_name=self._row.in_name)
         # By the last chunk of the key, which is the caller if the row names one.
         self._unanswered: dict[str, int] = {}
         self._waiting = 0
@@ -267,7 +267,7 @@ class Answerer:
 
     def _hand_over(self, query: zenoh.Query) -> None:
         """Queue a request for the event loop, or refuse it if too many are waiting."""
-        if self._long.reply_piece(query) or (arrived := self._parse(query)) is None:
+        if self._chunked.reply_chunk(query) or (arrived := self._parse(query)) is None:
             return
         if self._waiting >= _MOST or self._unanswered.get(arrived.caller, 0) >= self._most_of_one:
             self._turn_away(query)
@@ -327,11 +327,11 @@ class Answerer:
     def _reply(self, query: zenoh.Query, key: keys.Key, answer: Message | bytes) -> None:
         """Reply in the form of the request."""
         if isinstance(answer, bytes):
-            self._long.reply(query, str(key), answer, _OCTETS)
+            self._chunked.reply(query, str(key), answer, _OCTETS)
         else:
             as_json = is_json(_encoding(query))
             payload = encode(answer, as_json=as_json)
-            self._long.reply(query, str(key), payload, JSON if as_json else PROTOBUF)
+            self._chunked.reply(query, str(key), payload, JSON if as_json else PROTOBUF)
 
     async def _handled(self, request: Request, query: zenoh.Query) -> Message | bytes:
         """Return the handler's answer; both copies of a request sent over two links get the same one."""

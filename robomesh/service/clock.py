@@ -21,7 +21,7 @@ from robomesh.contract.messages import PROTOBUF, decode
 from robomesh.contract.topics import Priority
 from robomesh.errors import MessageError, NoAnswerError
 from robomesh.requests.replies import query
-from robomesh.requests.server import Answerer, Request
+from robomesh.requests.server import Request, RequestServer
 from robomesh.schemas.robomesh_pb2 import ClockAnswer, ClockRequest
 from robomesh.wire.session import Session
 
@@ -55,7 +55,7 @@ class Clock:
         return min(tuple(self.readings), key=lambda reading: reading.round_trip_s, default=None)
 
 
-def answer_clock(session: Session, site: str, *, wall_ns: Callable[[], int] = time.time_ns) -> Answerer:
+def answer_clock(session: Session, site: str, *, wall_ns: Callable[[], int] = time.time_ns) -> RequestServer:
     """Answer clock requests on this process's key.
 
     Args:

@@ -1,7 +1,7 @@
 """Counters of a session by row of the topic table: sent, received and answered since it was opened.
 
 They cost nothing until they are read: reading adds up the numbers that publishers, subscriptions and
-answerers keep anyway.
+servers of requests keep anyway.
 """
 
 from collections import Counter, defaultdict
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from robomesh.publications.publisher import Publisher
 from robomesh.publications.subscription import Subscription
 from robomesh.requests.latencies import Latencies
-from robomesh.requests.server import Answerer
+from robomesh.requests.server import RequestServer
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Counters:
     latencies: defaultdict[str, Latencies] = field(default_factory=lambda: defaultdict(Latencies))
 
     def add(self, declared: object) -> None:
-        """Add the numbers of one publisher, subscription or answerer."""
+        """Add the numbers of one publisher, subscription or server of requests."""
         match declared:
             case Publisher():
                 self.published[declared.topic.name] += declared.published
@@ -55,7 +55,7 @@ class Counters:
                 self.lost[name] += declared.total_lost
                 self.skipped[name] += declared.skipped
                 self.malformed[name] += declared.malformed
-            case Answerer():
+            case RequestServer():
                 self.turned_away[declared.name] += declared.turned_away
                 self.over_quota[declared.name] += declared.over_quota
                 self.latencies[declared.name].add_all(declared.latencies)

@@ -1,4 +1,4 @@
-"""A session on the mesh: a client of a router, with its publishers, subscriptions and answerers."""
+"""A session on the mesh: a client of a router, with its publishers, subscriptions and servers of requests."""
 
 import asyncio
 import logging
@@ -40,7 +40,7 @@ _AFTER_LIST = 1000
 # Name of a measure: remaining validity of the certificate, if there is one [s].
 CERTIFICATE = "certificate_seconds"
 
-_Declared = Publisher | Subscription | server.Answerer | presence.PresenceWatch
+_Declared = Publisher | Subscription | server.RequestServer | presence.PresenceWatch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ class Session:
     _answering: AnsweringThread = field(default_factory=AnsweringThread)
     # Of the publishers whose messages are put together.
     _outbox: Outbox | None = None
-    # Starts the handlers of all answerers.
+    # Starts the handlers of all servers of requests.
     _scheduler: RoundRobin | None = None
     # Additional connections by their names in the topic table.
     _extra: dict[str, zenoh.Session] = field(default_factory=dict)
@@ -223,7 +223,7 @@ class Session:
         *,
         on_refused: server.OnRefused = lambda chunk, reason: None,
         recall: server.Recall = lambda: None,
-    ) -> server.Answerer:
+    ) -> server.RequestServer:
         """Answer a request of the table: `stop`, `command/*`.
 
         Args:
@@ -238,7 +238,7 @@ class Session:
         connection = self.connection(topics.request(name).own_link, wait_s=_ROUTER_RETURNS_S)
         if self._scheduler is None:
             self._scheduler = RoundRobin()
-        answerer = server.Answerer(
+        declared = server.RequestServer(
             connection,
             site,
             robot,
@@ -249,8 +249,8 @@ class Session:
             recall=recall,
             ignored=self.ignored,
         )
-        self._keep(answerer)
-        return answerer
+        self._keep(declared)
+        return declared
 
     def declare_presence(self, site: str, robot: str, service: str) -> None:
         """Declare that a service is alive for a robot (`-`: for the whole site)."""

@@ -16,7 +16,7 @@ from robomesh.errors import RefusedError, RobomeshError
 from robomesh.publications.publisher import Publisher
 from robomesh.reasons import Reason
 from robomesh.recordings.errors import RecordingError
-from robomesh.requests.server import Answerer, Handler, Request
+from robomesh.requests.server import Handler, Request, RequestServer
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
 from services.player.clock import Clock
@@ -77,7 +77,7 @@ class Replay:
         )
         source.replay.start.FromNanoseconds(source.start_ns)
         self._publishers: dict[str, Publisher] = {}
-        self._answerers: list[Answerer] = []
+        self._servers: list[RequestServer] = []
 
     def describe(self) -> schema.ReplayState:
         """Return the state of the replay."""
@@ -124,8 +124,8 @@ class Replay:
             state_task.cancel()
             with contextlib.suppress(Exception):
                 token.undeclare()
-            for answerer in self._answerers:
-                answerer.close()
+            for server in self._servers:
+                server.close()
             for publisher in self._publishers.values():
                 publisher.close()
             self._source.close()
@@ -146,7 +146,7 @@ class Replay:
             ),
         }
         for name, handler in answers.items():
-            self._answerers.append(self._session.answer(self._site, self.robot, name, handler))
+            self._servers.append(self._session.answer(self._site, self.robot, name, handler))
 
     async def _refuse(self, request: Request) -> bytes:
         code = (

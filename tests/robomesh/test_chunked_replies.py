@@ -1,4 +1,4 @@
-"""Long answers in pieces: losses, dropped answers and too many requests."""
+"""Chunked replies: losses, dropped answers and too many requests."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -6,15 +6,15 @@ from contextlib import asynccontextmanager
 import pytest
 
 from robomesh.errors import BrokenAnswerError
-from robomesh.requests import pieces
+from robomesh.requests import chunked_replies
 from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 
 KEY = "robomesh/hall/arm/mesh/{}"
 NAMED = "robomesh/hall/arm/kinematics/check/{}"
-PIECES = 6
-LENGTH = (PIECES - 1) * pieces.PIECE_BYTES + 7
+CHUNKS = 6
+LENGTH = (CHUNKS - 1) * chunked_replies.CHUNK_BYTES + 7
 
 
 def mesh_of(name):
@@ -31,14 +31,14 @@ async def owner_and_caller(mesh):
             asked.append(request.chunk)
             return mesh_of(request.chunk)  # a new object for each request
 
-        answerer = owner.answer("hall", "arm", "mesh/*", answer)
+        server = owner.answer("hall", "arm", "mesh/*", answer)
         await asker.ask_bytes(KEY.format("ready"), timeout_s=20.0)
-        answerer._long._kept.clear()
+        server._chunked._kept.clear()
         named = owner.answer("hall", "arm", "kinematics/check/*", answer)
         await asker.ask_bytes(NAMED.format("ready"), timeout_s=20.0)
-        named._long._kept.clear()
+        named._chunked._kept.clear()
         asked.clear()
-        yield asker, asked, answerer._long, named._long
+        yield asker, asked, server._chunked, named._chunked
 
 
 async def get(asker, selector):
@@ -49,22 +49,22 @@ async def get(asker, selector):
 
 
 async def token_of(asker, name, key=KEY):
-    first = pieces.first_of((await get(asker, pieces.selector(key.format(name)))).ok)
+    first = chunked_replies.first_chunk((await get(asker, chunked_replies.selector(key.format(name)))).ok)
     assert first.length == LENGTH
     return first.token
 
 
-async def piece(asker, name, token, offset, key=KEY):
-    """Return a piece's bytes; None: refused."""
+async def chunk(asker, name, token, offset, key=KEY):
+    """Return a chunk's bytes; None: refused."""
     reply = await get(asker, f"{key.format(name)}?piece={token}:{offset}")
     return None if reply.ok is None else reply.ok.payload.to_bytes()
 
 
 def intercept(monkeypatch, act):
-    """Call `act` before the n-th request for a piece reaches its owner; True: lose the request."""
-    answered, seen = pieces.LongAnswers.reply_piece, []
+    """Call `act` before the n-th request for a chunk reaches its owner; True: lose the request."""
+    answered, seen = chunked_replies.ChunkedReplies.reply_chunk, []
 
-    def reply_piece(self, query):
+    def reply_chunk(self, query):
         if query.parameters.get("piece") is None:
             return False
         seen.append(query)
@@ -73,10 +73,10 @@ def intercept(monkeypatch, act):
                 return True
         return answered(self, query)
 
-    monkeypatch.setattr(pieces.LongAnswers, "reply_piece", reply_piece)
+    monkeypatch.setattr(chunked_replies.ChunkedReplies, "reply_chunk", reply_chunk)
 
 
-def test_lost_pieces_are_requested_again_and_the_handler_is_not(mesh, monkeypatch):
+def test_lost_chunks_are_requested_again_and_the_handler_is_not(mesh, monkeypatch):
     async def main():
         async with owner_and_caller(mesh) as (asker, asked, *_):
             intercept(monkeypatch, lambda answers, number: number % 3 == 0)
@@ -103,7 +103,7 @@ def test_answer_that_ends_early_is_an_error(mesh, monkeypatch):
             with pytest.raises(BrokenAnswerError) as caught:
                 await asker.ask_bytes(KEY.format("base"), timeout_s=2.0)
             reason = caught.value.reason
-            assert (reason.code, reason.causes[0].code) == ("request.broken_answer", "piece.none")
+            assert (reason.code, reason.causes[0].code) == ("request.broken_answer", "chunk.none")
             assert reason.values["bytes"] in ("30000", "60000")
 
     run(main())
@@ -111,15 +111,15 @@ def test_answer_that_ends_early_is_an_error(mesh, monkeypatch):
 
 def test_fetched_answers_are_dropped_first_and_equal_ones_are_kept_once(mesh, monkeypatch):
     async def main():
-        monkeypatch.setattr(pieces, "_KEPT_BYTES", 2 * LENGTH)
+        monkeypatch.setattr(chunked_replies, "_KEPT_BYTES", 2 * LENGTH)
         async with owner_and_caller(mesh) as (asker, _, answers, _):
             unfinished, fetched = await token_of(asker, "a"), await token_of(asker, "b")
-            for number in range(1, PIECES):
-                assert await piece(asker, "b", fetched, number * pieces.PIECE_BYTES)
+            for number in range(1, CHUNKS):
+                assert await chunk(asker, "b", fetched, number * chunked_replies.CHUNK_BYTES)
             # Many requests for one mesh drop no other answer.
             assert {await token_of(asker, "c") for _ in range(4)} == {await token_of(asker, "c")}
-            assert await piece(asker, "a", unfinished, LENGTH - 7) == b"a" * 7
-            assert await piece(asker, "b", fetched, LENGTH - 7) is None
+            assert await chunk(asker, "a", unfinished, LENGTH - 7) == b"a" * 7
+            assert await chunk(asker, "b", fetched, LENGTH - 7) is None
             assert len(answers._kept) == 2
 
     run(main())
@@ -131,11 +131,11 @@ def test_answer_in_a_callers_name_is_sent_a_few_times_only(mesh):
             another, token = await token_of(asker, "li", NAMED), await token_of(asker, "li", NAMED)
             assert another != token
             for offset in (LENGTH, "9" * 5000, "-1", "x", ""):
-                assert await piece(asker, "li", token, offset, NAMED) is None
+                assert await chunk(asker, "li", token, offset, NAMED) is None
             sent = 0
-            while await piece(asker, "li", token, 0, NAMED) is not None:
+            while await chunk(asker, "li", token, 0, NAMED) is not None:
                 sent += 1
-            assert sent == pieces._TIMES * (PIECES - 1)
+            assert sent == chunked_replies._TIMES * (CHUNKS - 1)
             assert list(answers._kept) == [another]
 
     run(main())
@@ -143,7 +143,7 @@ def test_answer_in_a_callers_name_is_sent_a_few_times_only(mesh):
 
 def test_an_idle_owner_keeps_nothing(mesh, monkeypatch):
     async def main():
-        monkeypatch.setattr(pieces, "_KEPT_S", 0.1)
+        monkeypatch.setattr(chunked_replies, "_KEPT_S", 0.1)
         async with owner_and_caller(mesh) as (asker, _, answers, _):
             await token_of(asker, "a")
             await until(lambda: not answers._kept)

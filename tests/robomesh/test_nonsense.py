@@ -71,21 +71,21 @@ def test_request_that_arrives_during_close_is_not_handled(mesh, plain):
         done.append(request)
         return schema.StopAnswer(stop_id=1)
 
-    def wait_until_received(answerer):
+    def wait_until_received(server):
         deadline = time.monotonic() + 40.0
-        while not answerer._unanswered:
+        while not server._unanswered:
             assert time.monotonic() < deadline
             time.sleep(0.01)
 
     async def main():
         async with open_session(mesh) as gateway:
-            answerer = gateway.answer("site", "arm", "stop", stop)
+            server = gateway.answer("site", "arm", "stop", stop)
             while not await ask_all(plain, Key("site", "arm", "stop"), b"", timeout_s=20.0):
                 pass
             done.clear()
             plain.get(STOP.format("arm"), lambda reply: None)
-            wait_until_received(answerer)  # blocks the loop, so that the request waits for it
-            answerer.close()
+            wait_until_received(server)  # blocks the loop, so that the request waits for it
+            server.close()
             for _ in range(10):
                 await asyncio.sleep(0)
             assert not done

@@ -89,12 +89,12 @@ async def refusals(session, error):
     async def refuse(_):
         raise error
 
-    answerer = session.answer("site", "arm", "stop", refuse)
+    server = session.answer("site", "arm", "stop", refuse)
     try:
         with pytest.raises(RefusedError) as refused:
             await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=5)
     finally:
-        answerer.close()
+        server.close()
     return refused.value
 
 
