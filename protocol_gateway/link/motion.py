@@ -9,8 +9,6 @@ from robots.kinematics.joints import JointType
 # Long enough to distinguish the slowest motion (1 % of 20 degrees a second) from a sensor's last digit.
 WINDOW_S = 0.5
 _SAMPLE_S = 0.1
-# Longer than the window, which may still hold positions of the motion before.
-_SETTLED_S = 2 * WINDOW_S
 _STILL_ROTARY = 1e-3  # rad
 _STILL_PRISMATIC = 1e-4  # m
 
@@ -37,13 +35,15 @@ class MotionDetector:
     @property
     def moving(self) -> bool | None:
         """True if the robot moved within the last half second; None: too few positions."""
-        if len(self._samples) < 2:
-            return None
-        last = self._samples[-1][1]
+        return None if len(self._samples) < 2 else self.moved_since(float("-inf"))
+
+    def moved_since(self, time_s: float) -> bool:
+        """Return whether the robot moved after a monotonic time, within the last half second."""
         return any(
             abs(there - here) > still
-            for _, sample in self._samples
-            for there, here, still in zip(sample, last, self._still, strict=True)
+            for sampled_s, sample in self._samples
+            if sampled_s >= time_s
+            for there, here, still in zip(sample, self._samples[-1][1], self._still, strict=True)
         )
 
 
@@ -64,19 +64,20 @@ def has_arrived(
 
 
 def is_moving(
-    activity: Activity | None, detector: MotionDetector, reported_for_s: float = 0.0
+    activity: Activity | None, detector: MotionDetector, reported_since_s: float = 0.0
 ) -> bool | None:
     """Return whether the robot moves, by the controller's activity if it reports one; None: unknown.
 
     Args:
-        reported_for_s: How long the controller has reported this activity. After a while, changing positions
-            count as motion even if the controller reports rest.
+        reported_since_s: Time of the first report of this activity (monotonic). Positions that change after
+            a while count as motion even if the controller reports rest. Those from before do not, however
+            long they are the newest ones: a busy machine delivers the next ones late.
     """
     if activity is None:
         return detector.moving
     if activity in (Activity.MOVING, Activity.HOMING):
         return True
-    return reported_for_s >= _SETTLED_S and bool(detector.moving)
+    return detector.moved_since(reported_since_s + WINDOW_S)
 
 
 def motion_may_be_held(activity: Activity | None) -> bool:

@@ -174,7 +174,7 @@ class Telemetry:
 
     def moving(self, now_s: float) -> bool | None:
         """Return whether the robot moves; None: unknown."""
-        return is_moving(self.status(now_s).activity, self.motion_detector, now_s - self._activity_since_s)
+        return is_moving(self.status(now_s).activity, self.motion_detector, self._activity_since_s)
 
     def fault(self, now_s: float) -> str:
         """Return the fault's text; empty: no fault."""

@@ -278,13 +278,26 @@ def test_positions_show_motion_that_the_controller_does_not_report(positions_at,
 def test_the_reported_activity_counts_before_positions():
     still, moving = watched(lambda t: (0.0, 0.0)), watched(lambda t: (t, 0.0))
     assert is_moving(Activity.HOMING, still) is True
-    assert is_moving(Activity.IDLE, moving) is False
+    assert is_moving(Activity.IDLE, moving, reported_since_s=1.5) is False
+    assert is_moving(Activity.IDLE, moving, reported_since_s=1.0) is True
     assert is_moving(None, MotionDetector(TYPES)) is None
     assert [motion_may_be_held(each) for each in (None, Activity.HOLDING, Activity.IDLE)] == [
         True,
         True,
         False,
     ]
+
+
+def test_late_positions_of_a_stopped_motion_are_no_new_motion():
+    """It would end the lease of an operator who has just reset the stop."""
+    detector = watched(lambda t: (t, 0.0))
+    stopped = {"activity": Activity.STOPPED, "reported_since_s": 2.0}
+    assert is_moving(detector=detector, **stopped) is False
+    for time_s in (3.2, 3.3):
+        detector.add((2.1, 0.0), time_s)
+        assert is_moving(detector=detector, **stopped) is False
+    detector.add((2.2, 0.0), 3.4)
+    assert is_moving(detector=detector, **stopped) is True
 
 
 @pytest.mark.parametrize(

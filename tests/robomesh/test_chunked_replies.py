@@ -103,7 +103,7 @@ def test_answer_that_ends_early_is_an_error(mesh, monkeypatch):
             with pytest.raises(BrokenAnswerError) as caught:
                 await asker.ask_bytes(KEY.format("base"), timeout_s=2.0)
             reason = caught.value.reason
-            assert (reason.code, reason.causes[0].code) == ("request.broken_answer", "chunk.none")
+            assert (reason.code, reason.causes[0].code) == ("request.broken_answer", "piece.none")
             assert reason.values["bytes"] in ("30000", "60000")
 
     run(main())
