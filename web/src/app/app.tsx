@@ -104,7 +104,7 @@ export function App() {
 /** The first stop of the Tab key: past the bar, to the page. Not a link: a hash is another page here. */
 function SkipLink() {
   return (
-    <button class="skip-link" onClick={() => document.getElementById("page")?.focus()}>
+    <button class="skip-link row tall-44 pad-0-16" onClick={() => document.getElementById("page")?.focus()}>
       {t("skip")}
     </button>
   );
@@ -141,9 +141,9 @@ function StopPlace({ robots }: { robots: readonly string[] }) {
   const named = robotOf(route.value);
   const robot = named && canBe(named) && !isReplay(named.robot) ? named.robot : "";
   return (
-    <div class="stop-place">
+    <div class="stop-place row narrow anchor gap-16">
       {stopNotice.value && (
-        <div class={`stop-notice ${stopNotice.value.kind}`}>
+        <div class={`stop-notice row card pad-8 ${stopNotice.value.kind}`}>
           <NoticeLine notice={stopNotice.value} />
           {unsentStop.value && reachable.value && <Button text={t("stop_again")} onClick={stopAgain} />}
           <Button quiet text={t("dismiss")} onClick={dismissStop} />
@@ -170,7 +170,7 @@ function StopButton(props: { robots: readonly string[]; text: TextName; hint: st
   const arrives = text === "stop" || text === "stop_all" || text === "stop_ours";
   return (
     <button
-      class={`stop ${arrives ? "" : "unreachable"} ${text === "stop_none" ? "none" : ""}`}
+      class={`stop row rigid large gap-12 ${arrives ? "" : "unreachable"} ${text === "stop_none" ? "none" : ""}`}
       disabled={robots.length === 0}
       onClick={() => void stop(robots)}
       title={mustSignIn.value ? a("no_stop") : props.hint}

@@ -18,21 +18,21 @@ const PAGES = ["fleet", "wall", "recordings", "events", "define", "settings"] as
 export function Bar({ children }: { children: ComponentChildren }) {
   const { page } = route.value;
   return (
-    <header class="bar">
-      <a class="brand" href="#/" aria-label={`robomesh, ${t("fleet")}`}>
+    <header class="bar row gap-16 pad-0-16">
+      <a class="brand row large bold tall-44 gap-8" href="#/" aria-label={`robomesh, ${t("fleet")}`}>
         <Mark />
         <span>robomesh</span>
       </a>
       {mustSignIn.value || (
         <>
-          <nav class="page-links" aria-label={t("pages")}>
+          <nav class="page-links rigid flex nowrap gap-4" aria-label={t("pages")}>
             <PageLinks current={page} />
           </nav>
           <PageMenu current={page} />
           <Crumbs />
         </>
       )}
-      <div class="bar-end">
+      <div class="bar-end rigid flex push">
         {mustSignIn.value || <AlarmBadge />}
         <AccountMenu />
         <button class="quiet in-settings" onClick={() => switchLanguage()} title={t("language_hint")}>
@@ -75,7 +75,7 @@ function PageMenu({ current }: { current: Route["page"] }) {
   useDismissal(menu, close);
   const name = current !== "robot" && !robotOf(route.value) ? t(current) : "";
   return (
-    <details ref={menu} class="page-menu">
+    <details ref={menu} class="page-menu rigid">
       <summary aria-label={name ? `${t("pages")}: ${name}` : t("pages")}>
         <svg viewBox="0 0 24 24" width="24" height="24" aria-hidden="true">
           <path d="M4 7h16M4 12h16M4 17h16" />
@@ -94,7 +94,7 @@ function Crumbs() {
   const { page } = route.value;
   const robot = robotOf(route.value);
   return (
-    <nav class={`crumbs ${robot ? "" : "no-robot"}`} aria-label={t("crumbs")}>
+    <nav class={`crumbs row narrow nowrap dim gap-4 ${robot ? "" : "no-robot"}`} aria-label={t("crumbs")}>
       {robot && (
         <>
           <span class="crumb-site">{robot.site}</span>

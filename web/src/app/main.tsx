@@ -1,3 +1,4 @@
+import "./styles"; // first: what a component imports besides overrides it
 import "@preact/signals";
 import { render } from "preact";
 import { isolateTexts } from "../i18n/text-isolation";
@@ -8,7 +9,6 @@ import { followThisTab } from "../mesh/control/control";
 import { renewWhileBusy } from "../mesh/control/renewal";
 import { applyTheme } from "../ui/theme";
 import { App } from "./app";
-import "./styles";
 
 isolateTexts();
 applyTheme();

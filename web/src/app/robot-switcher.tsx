@@ -23,8 +23,13 @@ export function RobotSwitcher({ robot, program }: { robot: RobotName | null; pro
   const [open, setOpen] = useState(false);
   useDismissal(place, () => setOpen(false));
   return (
-    <div class="switcher" ref={place}>
-      <button class="switcher-button" aria-haspopup="dialog" aria-expanded={open} onClick={() => setOpen(!open)}>
+    <div class="narrow anchor" ref={place}>
+      <button
+        class="switcher-button row wide nowrap tall-40 gap-8 pad-0-8"
+        aria-haspopup="dialog"
+        aria-expanded={open}
+        onClick={() => setOpen(!open)}
+      >
         {robot ? <strong title={robot.robot}>{robot.robot}</strong> : <span>{t("choose_robot")}</span>}
         <svg viewBox="0 0 12 12" width="12" height="12" aria-hidden="true">
           <path d="M2 4l4 4 4-4" />
@@ -75,7 +80,7 @@ function Robots(props: { robot: RobotName | null; link: (site: string, robot: st
   };
   const bySite = Map.groupBy(found, (key) => key.split("/")[1] ?? "");
   return (
-    <div class="switcher-sheet" role="dialog" aria-label={t("choose_robot")}>
+    <div class="switcher-sheet stack pad-8" role="dialog" aria-label={t("choose_robot")}>
       <input
         ref={input}
         type="search"
@@ -92,7 +97,7 @@ function Robots(props: { robot: RobotName | null; link: (site: string, robot: st
         onKeyDown={onKey}
       />
       {heldLease.value && <p class="switcher-hint dim">{t("other_robot_releases")}</p>}
-      <div class="switcher-list" ref={list} id={id} role="listbox" aria-label={t("all_robots")}>
+      <div class="grow short scroll" ref={list} id={id} role="listbox" aria-label={t("all_robots")}>
         {[...bySite].map(([site, keys]) => (
           <div key={site} role="group" aria-label={site}>
             <div class="switcher-site dim" aria-hidden="true">

@@ -15,7 +15,7 @@ export function AliveServices({ of: key }: { of: string }) {
   }
   const shown = [...names].sort(([a], [b]) => a.localeCompare(b));
   return (
-    <span class="services">
+    <span class="services flex wrap small dim gap-0-12">
       {shown.length
         ? shown.map(([name, count]) => (
             <span key={name}>

@@ -73,7 +73,7 @@ export function ChangePassword({ close }: { close: () => void }) {
       <p class={outcome && !outcome.done ? "sign-in-problem" : ""} role="status">
         {outcome?.text ?? "\u00a0"}
       </p>
-      <div class="account-row">
+      <div class="flex to-end gap-8">
         <Button text={a(outcome?.done ? "close" : "cancel")} type="button" onClick={close} />
         {!outcome?.done && <Button primary text={a(busy ? "changing" : "change")} type="submit" disabled={busy} />}
       </div>

@@ -31,7 +31,7 @@ export function JointLimitsPanel(props: {
   const missing = state?.notCounted ?? [];
   const unproven = state?.jointsUnproven;
   return (
-    <ul class={`margins ${stale && state ? "stale" : ""}`} aria-label={t("margins")}>
+    <ul class={`margins pad-0-16-8 ${stale && state ? "stale" : ""}`} aria-label={t("margins")}>
       <Margin
         name="clearance"
         label={t("clearance")}
@@ -91,8 +91,8 @@ function Margin(props: {
   const { name, label, of, level, share } = props;
   const full = Math.min(1, Math.max(0, share ?? 0));
   return (
-    <li class={`margin ${level}`} data-margin={name}>
-      <span class="margin-label">
+    <li class={`margin grid gap-12 ${level}`} data-margin={name}>
+      <span class="margin-label clip dim">
         {level !== "normal" && (
           <span
             class={`shape ${level}`}
@@ -110,7 +110,7 @@ function Margin(props: {
       <span class="margin-bar" aria-hidden="true">
         {share !== undefined && <span style={{ width: `${100 * full}%` }} />}
       </span>
-      <span class="margin-value">{props.children || "–"}</span>
+      <span class="margin-value nowrap right">{props.children || "–"}</span>
     </li>
   );
 }

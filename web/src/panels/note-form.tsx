@@ -41,7 +41,7 @@ export function NoteForm(props: {
   };
   return (
     <form
-      class="note-form"
+      class="note-form grid gap-8 pad-8-16"
       aria-label={n("note")}
       onKeyDown={(event) => event.key === "Escape" && props.close()}
       onSubmit={(event) => {
@@ -68,7 +68,7 @@ export function NoteForm(props: {
           set={setOperator}
         />
       )}
-      <div class="note-row">
+      <div class="note-row row wrap to-end gap-8">
         <NoticeLine notice={notice} idle={cannot} />
         <Button text={t("cancel")} type="button" onClick={props.close} />
         <Button primary text={n("save")} type="submit" disabled={busy || cannot !== "" || !text.trim()} />

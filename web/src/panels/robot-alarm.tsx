@@ -15,7 +15,7 @@ export function RobotAlarm({ state, events }: { state: ControllerState | undefin
   if (disobeys(state, events)) {
     return (
       <div class="over-page">
-        <div class="alarm-band" role="alert">
+        <div class="alarm-band row large bold gap-4 pad-8-16" role="alert">
           <span class="shape alarm" aria-hidden="true" />
           {t("disobeys")}
         </div>
@@ -28,7 +28,7 @@ export function RobotAlarm({ state, events }: { state: ControllerState | undefin
   const time = stampWhen(event.timestamp);
   return (
     <div class="over-page">
-      <div class="alarm-band past" role="alert">
+      <div class="alarm-band row large bold gap-4 pad-8-16 past" role="alert">
         <span class="shape alarm" aria-hidden="true" />
         <span title={stampFull(event.timestamp)}>
           {event.code === DISOBEYED ? t("disobeyed", { time }) : t("critical_at", { time, text: event.text })}

@@ -41,12 +41,12 @@ export function ValueChoice(props: {
   const turn = (value: string) =>
     props.choose(chosen.includes(value) ? chosen.filter((each) => each !== value) : [...chosen, value]);
   return (
-    <div class="values">
-      <div class="values-head">
+    <div class="values pad-0-16-8">
+      <div class="values-head row gap-16">
         <TextInput type="search" hint={r("values_filter")} value={filter} set={setFilter} />
         {full && <span class="dim small">{r("values_many", { count: most })}</span>}
       </div>
-      <div class="values-groups">
+      <div class="values-groups flex wrap scroll gap-8-24">
         {[...Map.groupBy(shown, topicOfValue)]
           .sort(([a], [b]) => rank(a) - rank(b))
           .map(([topic, values]) => (

@@ -194,10 +194,10 @@ export function SceneView(props: {
           onKeyDown={onKey}
           data-loaded={loaded}
         />
-        <span class="scene-label" ref={label} hidden />
+        <span class="scene-label nowrap small pad-0-8" ref={label} hidden />
       </div>
       {waiting && <Poster robotKey={robotKey} view={chosen.name} why={waiting} />}
-      <div class="scene-tools">
+      <div class="scene-tools flex wrap spread anchor gap-8 pad-8">
         <Choice
           label={t("view")}
           values={views.map((each) => each.name)}
@@ -220,12 +220,12 @@ export function SceneView(props: {
       )}
       {problem && <p class="scene-word trouble">{problem}</p>}
       {!staleJoints && props.arm === "absent" && (loaded || problem) && (
-        <p class="scene-stale" role="status">
+        <p class="scene-stale row nowrap large warned gap-4 pad-8-16" role="status">
           {r("no_joints_then")}
         </p>
       )}
       {stale && (staleJoints || !absent) && (loaded || problem) && (
-        <p class="scene-stale" role="status">
+        <p class="scene-stale row nowrap large warned gap-4 pad-8-16" role="status">
           <span class="shape warning" aria-hidden="true" />
           {/* Announce it once, not each second. */}
           <span aria-live="off">{age === undefined ? t("no_data") : staleText(age)}</span>

@@ -23,7 +23,7 @@ export function priorityWord(priority: Priority): string {
 export function PriorityMark({ of: priority, children }: { of: Priority; children?: string | number }) {
   const [, name] = WORDS[priority] ?? [null, "high"];
   return (
-    <span class={`priority ${name}`}>
+    <span class={`priority inline-row nowrap dim ${name}`}>
       <span class="priority-shape" aria-hidden="true" />
       {children ?? priorityWord(priority)}
     </span>

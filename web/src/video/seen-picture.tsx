@@ -117,8 +117,8 @@ function SeenDialog(props: { site: string; robot: string; seen: Seen; close: () 
           {t("close")}
         </button>
       </div>
-      <div class="seen-body">
-        <div class="seen-still" data-found={found}>
+      <div class="seen-body grid gap-8">
+        <div class="seen-still grid center" data-found={found}>
           <canvas ref={canvas} role="img" aria-label={t("seen_title")} hidden={!found} />
           {!found && <p class="dim">{text}</p>}
         </div>

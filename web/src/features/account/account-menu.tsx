@@ -23,11 +23,11 @@ export function AccountMenu() {
   const roleName = textIn("account", `role_${role}`) ?? role;
   const operator = hello.value?.operator || who.operator;
   return (
-    <details ref={menu} class="account-menu" aria-label={a("account")}>
+    <details ref={menu} class="account-menu anchor" aria-label={a("account")}>
       <summary title={a("menu", { account, role: roleName })}>
-        <span class="account-name">{account}</span> <span class="account-role dim">{roleName}</span>
+        <span class="account-name">{account}</span> <span class="account-role small dim">{roleName}</span>
       </summary>
-      <div class="account-sheet">
+      <div class="account-sheet stack gap-8">
         {changing ? (
           <ChangePassword close={close} />
         ) : (

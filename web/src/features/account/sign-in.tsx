@@ -37,9 +37,9 @@ export function SignIn() {
     setBusy(false);
   };
   return (
-    <section class="sign-in" aria-label={a("sign_in")}>
+    <section class="sign-in stack grow" aria-label={a("sign_in")}>
       {/* For narrow screens, where the bar has no space for them. */}
-      <p class="sign-in-look">
+      <p class="sign-in-look to-end gap-8">
         <Button quiet text={t("language")} onClick={() => switchLanguage()} title={t("language_hint")} />
         <Button quiet text={t(theme.value === "dark" ? "theme_light" : "theme_dark")} onClick={switchTheme} />
       </p>

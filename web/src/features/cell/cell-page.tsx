@@ -52,7 +52,7 @@ export function CellPage({ site, robot }: RobotName) {
   return (
     <>
       <RobotAlarm state={controller?.message} events={events} />
-      <div class="cell-page">
+      <div class="cell-page grid grow short gap-8 pad-8">
         <div class="headline">
           <div class="glance">
             <div class="who">
@@ -77,7 +77,7 @@ export function CellPage({ site, robot }: RobotName) {
           lostAt={null}
           staged={setStage}
         />
-        <div class="cell-side">
+        <div class="cell-side stack narrow gap-8">
           {state ? (
             <>
               <ContentPanel robotKey={key} />

@@ -73,7 +73,7 @@ export function ContentPanel({ robotKey }: { robotKey: string }) {
         />
       }
     >
-      <ul class="cell-rows">
+      <ul class="pad-0-8">
         <Row name="" kind={c("floor")} detail={floorText(shownContent.value?.floor)} mark={floorMark()} />
         {rows.value.map(({ fixture, mark }) => (
           <Row
@@ -86,7 +86,7 @@ export function ContentPanel({ robotKey }: { robotKey: string }) {
         ))}
       </ul>
       {state?.cell && (
-        <div class="cell-add" role="group" aria-label={c("add")}>
+        <div class="cell-add flex wrap gap-8 pad-8-16" role="group" aria-label={c("add")}>
           {(["box", "cylinder", "sphere"] as const).map((kind) => (
             <Button key={kind} text={c(`add_${kind}`)} type="button" disabled={!may} onClick={() => add(kind)} />
           ))}
@@ -100,14 +100,14 @@ export function ContentPanel({ robotKey }: { robotKey: string }) {
           close={() => setReview(null)}
           done={(reason) => void confirm(reason)}
         >
-          <ul class="cell-changes">
+          <ul class="cell-changes pad-0-8">
             {review.changes.map((each) => (
               <li key={`${each.fixture}.${each.key}`}>{changeText(each)}</li>
             ))}
           </ul>
         </ReasonForm>
       ) : (
-        <div class="cell-actions">
+        <div class="cell-actions flex wrap gap-8 pad-8-16 to-end">
           <Button
             text={c("discard")}
             type="button"
@@ -149,10 +149,10 @@ function Row(props: { name: string; kind: string; detail: string; mark: Mark }) 
   const value = name || FLOOR;
   const old = published.value?.content?.fixtures.find((each) => each.name === name);
   return (
-    <li class={`cell-row ${mark}`}>
+    <li class={`cell-row row gap-8 ${mark}`}>
       <button
         type="button"
-        class="cell-pick"
+        class="cell-pick flex wrap baseline grow narrow small left tall-44 pad-8"
         aria-pressed={chosen.value === value}
         onClick={() => (chosen.value = value)}
       >

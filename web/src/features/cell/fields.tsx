@@ -10,9 +10,9 @@ import { type Quantity, UNITS } from "./cell-text";
 
 export function Fields(props: { label: string; children: ComponentChildren }) {
   return (
-    <fieldset class="cell-fields">
+    <fieldset class="cell-fields pad-4-16-8">
       <legend>{props.label}</legend>
-      <div class="cell-numbers-row">{props.children}</div>
+      <div class="cell-numbers-row grid gap-8">{props.children}</div>
     </fieldset>
   );
 }
@@ -54,7 +54,7 @@ export function NumberField(props: {
   const id = useId();
   const { unit, factor } = UNITS[props.quantity];
   return (
-    <span class="cell-number">
+    <span class="cell-number grid small">
       <label for={id}>{props.label}</label>
       <NumberInput
         id={id}

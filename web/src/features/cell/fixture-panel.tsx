@@ -53,7 +53,7 @@ export function FixturePanel() {
       />
       <Shape fixture={fixture} set={set} />
       <Name key={`${name} name`} name={name} />
-      <div class="cell-actions">
+      <div class="cell-actions flex wrap gap-8 pad-8-16 to-end">
         <Button
           destructive
           text={c("remove")}
@@ -132,7 +132,7 @@ function FloorPanel({ floor }: { floor: CellFloor }) {
   const set = (edit: (floor: CellFloor) => void) => change((content) => content.floor && edit(content.floor));
   return (
     <Panel title={c("floor")} name="cell-numbers">
-      <div class="cell-toggles">
+      <div class="flex wrap gap-8 pad-8-16">
         <Toggle on={!floor.none} set={(on) => set((each) => (each.none = !on))}>
           {c("has_floor")}
         </Toggle>
@@ -170,7 +170,7 @@ function Name({ name }: { name: string }) {
   const isNew = !published.value?.content?.fixtures.some((each) => each.name === name);
   if (!isNew) return null;
   return (
-    <div class="cell-fields">
+    <div class="cell-fields pad-4-16-8">
       <label for={id}>{c("name")}</label>
       <input
         id={id}

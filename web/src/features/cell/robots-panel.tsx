@@ -12,7 +12,7 @@ export function RobotsPanel({ robots }: { robots: readonly CellMember[] }) {
     <Panel title={c("robots")} name="cell-robots">
       <p class="notice">{c("needs_restart")}</p>
       {robots.map((robot) => (
-        <dl class="cell-facts" key={robot.name} aria-label={robot.name}>
+        <dl class="cell-facts grid small" key={robot.name} aria-label={robot.name}>
           <dt class="cell-robot">{robot.name}</dt>
           <dd />
           <Fact name={c("model")}>{robot.model}</Fact>

@@ -59,7 +59,7 @@ export function CollisionsTab() {
       </div>
       <PlanState rows={rows} />
       {rows.length > 0 && (
-        <table class="pairs" aria-label={d("collisions")} aria-busy={planning.value}>
+        <table class="pairs wide small" aria-label={d("collisions")} aria-busy={planning.value}>
           <thead>
             <tr>
               <th scope="col">{d("ignore")}</th>
@@ -83,7 +83,7 @@ export function CollisionsTab() {
 function PlanState({ rows }: { rows: readonly PairRow[] }) {
   if (planError.value) {
     return (
-      <div class="plan-state" role="alert">
+      <div class="plan-state grid gap-4 pad-0-16-12" role="alert">
         <Warning class="problem-word" text={d("plan_failed", { text: planError.value })} />
         <Button quiet text={d("plan_again")} onClick={planAgain} />
       </div>
@@ -92,7 +92,7 @@ function PlanState({ rows }: { rows: readonly PairRow[] }) {
   const ignored = rows.filter(({ isIgnored }) => isIgnored).length;
   const touching = rows.filter(isTouching).length;
   return (
-    <div class="plan-state" role="status">
+    <div class="plan-state grid gap-4 pad-0-16-12" role="status">
       {isPlanned.value && rows.length === 0 && <p class="dim small">{d("no_pairs")}</p>}
       {isPlanned.value && rows.length > 0 && (
         <>

@@ -45,14 +45,14 @@ export function DefinePage({ name }: { name: string }) {
   useKeys();
   useDrop();
   return (
-    <div class={`define ${draft.value ? "editing" : "starting"}`}>
-      <div class="define-top">
+    <div class={`define grid grow short gap-8 pad-8 ${draft.value ? "editing" : "starting"}`}>
+      <div class="define-top grid gap-8">
         <Toolbar />
         <Outcomes />
         <MissingFiles />
       </div>
       {draft.value ? <DraftPanels /> : loading.value ? <p class="dim define-loading">{loading.value}</p> : <NewRobot />}
-      {draggedOver.value && <div class="drop-veil">{d("dropped")}</div>}
+      {draggedOver.value && <div class="drop-veil grid center">{d("dropped")}</div>}
     </div>
   );
 }
@@ -68,15 +68,15 @@ function DraftPanels() {
   };
   return (
     <>
-      <div class="define-left">
+      <div class="define-left stack short gap-8">
         <KinematicChain />
         <ProblemsPanel />
       </div>
       <ScenePanel />
       <PositionsPanel />
-      <section class="panel define-right" aria-label={d("details")}>
+      <section class="panel define-right short" aria-label={d("details")}>
         <DhTable />
-        <div class="tabs" role="tablist" aria-label={d("details")}>
+        <div class="tabs flex wrap" role="tablist" aria-label={d("details")}>
           {TABS.map((each) => (
             <button
               key={each}
@@ -90,7 +90,13 @@ function DraftPanels() {
             </button>
           ))}
         </div>
-        <div id="tab-panel" class="tab-panel" role="tabpanel" aria-labelledby={`tab-${tab.value}`} tabIndex={-1}>
+        <div
+          id="tab-panel"
+          class="tab-panel grow short scroll"
+          role="tabpanel"
+          aria-labelledby={`tab-${tab.value}`}
+          tabIndex={-1}
+        >
           {tabs[tab.value]()}
         </div>
       </section>

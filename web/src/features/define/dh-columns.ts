@@ -10,7 +10,7 @@ export interface Column {
   key: ColumnKey;
   /** Path of its value below the joint's, as in the server's problems. */
   path: string;
-  group: "row" | "motion";
+  group: "dh" | "motion";
   step: number;
   /** Short text of the header. */
   head: () => string;
@@ -19,7 +19,7 @@ export interface Column {
 }
 
 const parameter = (key: "a" | "alpha" | "d" | "theta", head: string): Column => ({
-  ...{ key, path: key, group: "row", step: 1 },
+  ...{ key, path: key, group: "dh", step: 1 },
   head: () => head,
   title: () => d(`dh_${key}`),
 });

@@ -25,7 +25,7 @@ export function DhTable() {
   }));
   return (
     <>
-      <div class="dh-head">
+      <div class="dh-head row spread rigid tall-40">
         <h3>{d("dh_head")}</h3>
         <Button quiet text={d("paste_button")} title={d("paste_hint")} onClick={() => openPasteTable()} />
       </div>
@@ -55,7 +55,11 @@ export function DhTable() {
             {joints.map((joint, index) => (
               <tr key={index} class={chosenPart.value === index ? "chosen" : ""}>
                 <th scope="row">
-                  <button class="row-name" title={joint.name} onClick={() => choosePart(index)}>
+                  <button
+                    class="row-name row spread wide left tall-32 gap-4"
+                    title={joint.name}
+                    onClick={() => choosePart(index)}
+                  >
                     <span>{joint.name || "–"}</span>
                     {problemsAt(`joint/${index}`).length > 0 && <span class="shape warning" aria-hidden="true" />}
                   </button>
@@ -125,7 +129,7 @@ function TableProblems({ id, joints }: { id: string; joints: readonly Joint[] })
   );
   const lines = [...new Map(found.map((each) => [`${each.name} ${each.text}`, each])).values()];
   return (
-    <ul id={id} class="dh-problems" aria-label={d("dh_problems")} hidden={lines.length === 0}>
+    <ul id={id} class="dh-problems grid rigid scroll gap-4" aria-label={d("dh_problems")} hidden={lines.length === 0}>
       {lines.map(({ name, head, text }) => (
         <Warning
           key={`${name} ${text}`}

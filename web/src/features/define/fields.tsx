@@ -62,7 +62,7 @@ export function NumberField(
         end={endUndoStep}
         onFocus={() => props.onFocus?.()}
       />
-      {props.unit && <span class="entry-unit">{props.unit}</span>}
+      {props.unit && <span class="entry-unit rigid small dim">{props.unit}</span>}
     </Labelled>
   );
 }
@@ -135,8 +135,8 @@ export function PoseFields({ path, of }: { path: string; of: string }) {
 
 export function Section(props: { title: string; end?: ComponentChildren; children: ComponentChildren }) {
   return (
-    <section class="section" aria-label={props.title}>
-      <div class="section-head">
+    <section class="section grid gap-8" aria-label={props.title}>
+      <div class="row spread tall-32 gap-8">
         <h3>{props.title}</h3>
         {props.end}
       </div>

@@ -148,7 +148,7 @@ export function KinematicChain() {
           + {d("add_joint")}
         </button>
       </div>
-      <ol class="chain-list" aria-label={d("chain")} title={d("chain_hint")}>
+      <ol class="chain-list scroll pad-0-8 anchor" aria-label={d("chain")} title={d("chain_hint")}>
         <Row
           part="base"
           mark="0"
@@ -161,7 +161,7 @@ export function KinematicChain() {
           <li
             key={index}
             data-row={index}
-            class={`chain-item ${dropClass(index)}`}
+            class={`chain-item row ${dropClass(index)}`}
             style={dragged.value?.from === index ? { transform: `translateY(${dragged.value.by}px)` } : {}}
             onPointerDown={(event) => startDrag(event, index, count)}
             onKeyDown={(event) => {
@@ -200,7 +200,7 @@ export function KinematicChain() {
       <p class="chain-said" role="status">
         {announced.value}
       </p>
-      <div class="chain-tools" role="group" aria-label={d("chain_tools")}>
+      <div class="chain-tools flex ruled pad-4-8" role="group" aria-label={d("chain_tools")}>
         <Button
           quiet
           text={d("insert")}
@@ -238,7 +238,7 @@ function focusRow(index: number): void {
 
 function Row(props: Parameters<typeof RowButton>[0]) {
   return (
-    <li class={`chain-item ${dropClass(props.part)}`} {...(props.part === "base" && { "data-row": "base" })}>
+    <li class={`chain-item row ${dropClass(props.part)}`} {...(props.part === "base" && { "data-row": "base" })}>
       <RowButton {...props} />
     </li>
   );
@@ -256,15 +256,15 @@ function RowButton(props: {
   const wrong = problemsAt(props.path)[0];
   return (
     <button
-      class="chain-row"
+      class="chain-row row wide left tall-44 gap-12"
       data-part={String(props.part)}
       aria-current={chosenPart.value === props.part}
       onClick={() => choosePart(props.part)}
     >
-      <span class="chain-mark" aria-hidden="true">
+      <span class="chain-mark rigid dim" aria-hidden="true">
         {props.mark}
       </span>
-      <span class="chain-words">
+      <span class="chain-words grid grow narrow">
         <strong>{props.name}</strong>
         <span class={`dim ${props.faint ? "faint" : ""}`}>{props.facts}</span>
       </span>

@@ -17,7 +17,7 @@ export function MissingFiles() {
     else skippedFiles.value = new Set([...skippedFiles.value, ...missing.map(({ path }) => path)]);
   };
   return (
-    <section class="panel missing-files" aria-label={d("missing_title")} role="alert">
+    <section class="panel missing-files wrap spread gap-8-24 pad-8-16" aria-label={d("missing_title")} role="alert">
       <div>
         <h2>{d("missing_title")}</h2>
         {waiting && <p>{d("missing_count", { found: waiting.found, missing: waiting.missing.length })}</p>}
@@ -30,7 +30,7 @@ export function MissingFiles() {
         </ul>
         <p class="dim small">{d("missing_words")}</p>
       </div>
-      <div class="missing-actions">
+      <div class="flex gap-8">
         <FileButton label={d("choose_files")} multiple take={(files) => void takeFiles(chosen(files))} />
         <Button quiet text={d("go_on_without")} onClick={continueWithout} />
       </div>

@@ -23,12 +23,12 @@ export function NewRobot() {
   useEffect(() => void listRobots(), []);
   const robots = knownRobots.value?.robots;
   return (
-    <div class="start">
-      <div class="start-head">
+    <div class="start grid wide gap-16">
+      <div class="start-head grid gap-8">
         <h1>{d("start_title")}</h1>
         <p class="dim">{d("start_words")}</p>
         {newDrafts().map(({ id, name, at }) => (
-          <p key={id} class="start-draft">
+          <p key={id} class="row wrap gap-8-16">
             <Button text={d("continue_draft", { name, time: whenText(at) })} onClick={() => restoreDraft("", id)} />
           </p>
         ))}
@@ -42,7 +42,7 @@ export function NewRobot() {
         <FileButton label={d("choose_files")} multiple take={(files) => void takeFiles(chosen(files))} />
         {reading.value && <p role="status">{reading.value}</p>}
       </section>
-      <div class="start-more">
+      <div class="start-more grid gap-16">
         <section class="panel" aria-label={d("start_urdf")}>
           <h2>{d("start_urdf")}</h2>
           <p class="dim">{d("start_urdf_words")}</p>
@@ -54,13 +54,13 @@ export function NewRobot() {
           <Button text={d("start_empty_button")} onClick={startEmpty} />
         </section>
       </div>
-      <section class="start-robots" aria-label={d("start_robot")}>
+      <section class="grid gap-8" aria-label={d("start_robot")}>
         <h2>{d("start_robot")}</h2>
         {robots?.length === 0 && <p class="dim">{d("start_none")}</p>}
-        <ul class="robot-cards">
+        <ul class="robot-cards grid gap-8">
           {(robots ?? []).map(({ name, title, origin, joints, running }) => (
             <li key={name}>
-              <a class="robot-card" href={`#/define/${encodeURIComponent(name)}`}>
+              <a class="robot-card grid card pad-8-16" href={`#/define/${encodeURIComponent(name)}`}>
                 <strong>{title || name}</strong>
                 <span class="dim small">
                   {[

@@ -135,7 +135,7 @@ function Colour({ path, color }: { path: string; color: string }) {
   return (
     <span class="field">
       <span class="label">{d("colour")}</span>
-      <span class="colour">
+      <span class="colour row gap-8">
         <input
           type="color"
           data-path={path}
@@ -144,7 +144,7 @@ function Colour({ path, color }: { path: string; color: string }) {
           onInput={(event) => setValue(path, event.currentTarget.value)}
           onChange={endUndoStep}
         />
-        <span class="colour-word">{color || <span class="dim">{d("colour_own")}</span>}</span>
+        <span class="grow narrow small">{color || <span class="dim">{d("colour_own")}</span>}</span>
         {color && (
           <button
             class="quiet sign"

@@ -90,7 +90,7 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
   return (
     <dialog
       ref={dialog}
-      class="paste-dialog panel"
+      class="paste-dialog stack panel"
       aria-labelledby={id}
       onKeyDown={(event) => event.key === "Escape" && close()}
     >
@@ -100,11 +100,11 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
           {d("close")}
         </button>
       </div>
-      <div class="paste-body">
+      <div class="paste-body grid scroll gap-12">
         <PasteText text={text} set={setTable} refused={refused} />
         {found && columns && read && (
           <>
-            <div class="paste-choices">
+            <div class="paste-choices flex wrap gap-8-24">
               <Labelled label={d("paste_separator")}>
                 <Select
                   label={d("paste_separator")}
@@ -181,7 +181,7 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
           </>
         )}
       </div>
-      <div class="paste-end">
+      <div class="flex to-end ruled gap-8 pad-8-16">
         <Button text={d("cancel")} onClick={close} />
         <Button primary text={d("paste_fill")} disabled={values === 0} onClick={fill} />
       </div>
@@ -191,7 +191,7 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
 
 function Labelled(props: { label: string; children: preact.ComponentChildren }) {
   return (
-    <div class="paste-choice">
+    <div class="paste-choice grid gap-4">
       <span class="label">{props.label}</span>
       {props.children}
     </div>
@@ -210,7 +210,7 @@ function PasteText(props: { text: string; set: (text: string) => void; refused: 
   };
   const refused = tooLong ? { refused: "too_long" as const, count: tooLong } : props.refused;
   return (
-    <div class="paste-text">
+    <div class="paste-text grid gap-4">
       <label for={id}>{d("paste_words")}</label>
       <textarea
         id={id}
@@ -359,7 +359,7 @@ function Result(props: Shown & { joints: number; modified: boolean }) {
     ...(props.modified ? [d("paste_modified_words")] : []),
   ];
   return (
-    <div class="paste-result" role="status">
+    <div class="grid gap-4" role="status">
       {problems.slice(0, MOST_PROBLEMS).map(({ row, column, text }) => {
         const { head = "", meaning = "ignored" } = columns[column] ?? {};
         const name = head || d("paste_column", { number: column + 1 });

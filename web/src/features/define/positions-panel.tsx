@@ -46,7 +46,7 @@ export function PositionsPanel() {
           />
         </div>
       </div>
-      <div class="sliders">
+      <div class="sliders grid scroll gap-0-8 pad-0-16">
         {joints.length === 0 && <p class="dim">{d("no_joints")}</p>}
         {joints.map((joint, index) => (
           <Slider key={index} joint={joint} units={units} />
@@ -64,9 +64,9 @@ function Slider({ joint, units }: { joint: Joint; units: Units }) {
   const usable = lower < upper;
   const step = unit === "rad" || unit === "m" ? 0.001 : 0.1;
   return (
-    <div class="slider">
+    <div class="slider grid whole-row tall-40">
       <span class="slider-name">{joint.name}</span>
-      <span class="limit dim">{numberText(Math.round(lower * 100) / 100)}</span>
+      <span class="limit small dim">{numberText(Math.round(lower * 100) / 100)}</span>
       <input
         type="range"
         aria-label={d("position_of", { joint: joint.name })}
@@ -78,7 +78,7 @@ function Slider({ joint, units }: { joint: Joint; units: Units }) {
         disabled={!usable}
         onInput={(event) => slide(joint, Math.round(Number(event.currentTarget.value) * 1e4) / 1e4)}
       />
-      <span class="limit dim">{numberText(Math.round(upper * 100) / 100)}</span>
+      <span class="limit small dim">{numberText(Math.round(upper * 100) / 100)}</span>
       <NumberField
         quiet
         path=""
@@ -110,10 +110,10 @@ function ToolAt() {
     </div>
   );
   return (
-    <div class="tool-line">
+    <div class="tool-line row ruled gap-16 pad-8-16">
       <h3>{d("tool")}</h3>
       <dl
-        class={`tool-at ${checking.value || checkError.value ? "waiting" : ""}`}
+        class={`tool-at grid grow narrow gap-4-8 ${checking.value || checkError.value ? "waiting" : ""}`}
         aria-label={d("tool_at")}
         data-tool={tool ? JSON.stringify(tool) : ""}
         aria-busy={checking.value}

@@ -18,11 +18,15 @@ export function ProblemsPanel() {
           </span>
         </div>
       </div>
-      <div class="check-list">
+      <div class="check-list scroll tall-40">
         {checkError.value && <p class="problem-word">{d("check_failed", { text: checkError.value })}</p>}
         {checked.value && !readingShapes.value && found.length === 0 && <p class="dim small">{d("no_problems")}</p>}
         {found.map(({ path, text }) => (
-          <button key={`${path.join("/")} ${text}`} class="problem" onClick={() => openField(path)}>
+          <button
+            key={`${path.join("/")} ${text}`}
+            class="problem flex baseline wide break small left"
+            onClick={() => openField(path)}
+          >
             <span class="shape warning" aria-hidden="true" />
             <span>{text}</span>
           </button>

@@ -135,7 +135,7 @@ export function ScenePanel() {
           onKeyDown={onKey}
         />
       </div>
-      <div class="scene-tools">
+      <div class="scene-tools flex wrap spread anchor gap-8 pad-8">
         <Choice
           label={t("view")}
           values={views}
@@ -152,7 +152,7 @@ export function ScenePanel() {
           </Toggle>
         </div>
       </div>
-      <div class="scene-foot">
+      <div class="scene-foot row spread gap-8">
         <span title={d("gizmo_hint")}>
           <Choice
             label={d("gizmo")}
@@ -162,9 +162,11 @@ export function ScenePanel() {
             choose={setDragging}
           />
         </span>
-        {dragging !== "off" && picture && !canPlace(picture) && <span class="scene-hint">{d("gizmo_hint")}</span>}
+        {dragging !== "off" && picture && !canPlace(picture) && (
+          <span class="scene-hint flex small gap-12 pad-4-8">{d("gizmo_hint")}</span>
+        )}
         {rows && (
-          <span class="scene-legend">
+          <span class="scene-legend flex small gap-12 pad-4-8">
             <span class="key-z">{d("legend_z")}</span>
             <span class="key-d">{d("legend_d")}</span>
             <span class="key-a">{d("legend_a")}</span>

@@ -31,18 +31,18 @@ export function Toolbar() {
   const state = isUnsaved.value ? (siteName ? "unsaved" : "not_yet_saved") : siteName ? "all_saved" : "no_changes";
   const running = isRunning();
   return (
-    <div class="toolbar" role="toolbar" aria-label={d("define")}>
-      <div class="toolbar-name">
+    <div class="row wrap tall-40 gap-8" role="toolbar" aria-label={d("define")}>
+      <div class="toolbar-name flex baseline narrow gap-12 pad-0-8">
         <h1>{title || name || d("define")}</h1>
-        <span class={`save-state ${isUnsaved.value ? "unsaved" : ""}`} role="status">
+        <span class={`save-state nowrap small dim ${isUnsaved.value ? "unsaved" : ""}`} role="status">
           {busy.value || reading.value || d(state)}
         </span>
       </div>
-      <div class="toolbar-group">
+      <div class="toolbar-group flex wrap gap-8">
         <Button text={d("undo")} disabled={!canUndo.value} onClick={undo} title={`${d("undo")} (Ctrl+Z)`} />
         <Button text={d("redo")} disabled={!canRedo.value} onClick={redo} title={`${d("redo")} (Ctrl+Shift+Z)`} />
       </div>
-      <div class="toolbar-group">
+      <div class="toolbar-group flex wrap gap-8">
         {/* biome-ignore lint/a11y/useValidAnchor: it navigates; the click clears the draft first. */}
         <a class="action" href="#/define" onClick={startNewDraft}>
           {d("new")}
@@ -75,7 +75,7 @@ export function Outcomes() {
   const [sure, setSure] = useState(false);
   const done = outcome.value;
   return (
-    <div class="outcomes">
+    <div class="outcomes stack gap-4">
       {restoredFrom.value !== null && draft.value && (
         <div class="outcome" role="status">
           <span>{sure ? d("discard_sure") : d("brought_back", { time: whenText(restoredFrom.value) })}</span>
@@ -138,7 +138,7 @@ function FileNotices() {
   return (
     <div class={`outcome ${refused.length ? "refused" : "done"}`} {...outcomeRole(refused.length > 0)}>
       {refused.length > 0 && <span class="shape warning" aria-hidden="true" />}
-      <ul class="file-notices" tabIndex={0} aria-label={d("about_files")}>
+      <ul class="file-notices narrow scroll break" tabIndex={0} aria-label={d("about_files")}>
         {[...refused, ...others].map(({ text }) => (
           <li key={text}>{text}</li>
         ))}

@@ -24,7 +24,7 @@ export function ViewsTab() {
   return (
     <>
       <p class="dim small tab-intro">{d("views_words")}</p>
-      <ul class="view-list">
+      <ul class="view-list pad-0-16">
         {names.map((name) => (
           <li key={name}>
             <span class="view-name">
@@ -45,7 +45,7 @@ export function ViewsTab() {
               onClick={() => setFromCamera(name)}
             />
             {given[name] && (
-              <span class="view-more">
+              <span class="view-more flex to-end gap-8">
                 <SelectField
                   quiet
                   path={`view/${name}/projection`}

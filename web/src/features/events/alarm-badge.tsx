@@ -29,10 +29,14 @@ export function AlarmBadge() {
         ? e("badge", { counts: counted.map(numbered).join(", ") })
         : e("badge_none");
   return (
-    <a class={`alarm-badge ${counted.length ? "" : "calm"}`} href="#/events" title={words}>
+    <a
+      class={`alarm-badge inline-row nowrap anchor tall-32 ${counted.length ? "" : "calm"}`}
+      href="#/events"
+      title={words}
+    >
       <span class="unseen">{words}</span>
       {silent.length > 0 && <span class="shape warning" aria-hidden="true" />}
-      <span class="badge-counts" aria-hidden="true">
+      <span class="inline-row gap-8" aria-hidden="true">
         {worst ? (
           <>
             <PriorityMark of={worst.priority}>{numbered(worst)}</PriorityMark>

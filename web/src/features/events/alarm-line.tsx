@@ -40,8 +40,8 @@ export function AlarmLine(props: {
   const [title, advice] = [alarmText(alarm), alarmAdvice(alarm.code, alarm.advice)];
   const when = alarm.last ?? alarm.since;
   return (
-    <li class={`alarm-line ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`}>
-      <label class="alarm-select">
+    <li class={`alarm-line grid dim gap-0-12 pad-8-16 ${open ? "open" : ""} ${state === State.RETURNED ? "over" : ""}`}>
+      <label class="alarm-select row">
         <input
           type="checkbox"
           checked={props.selected}
@@ -52,7 +52,7 @@ export function AlarmLine(props: {
       <PriorityMark of={alarm.priority} />
       <span class="alarm-state">{stateText(state)}</span>
       <time title={stampFull(when)}>{stampTime(when)}</time>
-      <span class="alarm-of">
+      <span class="alarm-of break">
         {robot === "-" || !robot ? (
           <>
             {site} <span class="dim">{e("whole_site")}</span>
@@ -68,15 +68,15 @@ export function AlarmLine(props: {
         {!title && <strong lang="en">{text}</strong>}
         {advice && <span class="alarm-advice">{e("advice", { text: advice })}</span>}
         {title && (
-          <span class="dim alarm-more">
+          <span class="dim small">
             {e("in_its_words")} <span lang="en">{text}</span>
           </span>
         )}
-        <span class="dim alarm-more">
+        <span class="dim small">
           {more(alarm).join(" · ")} · <code title={e("id_hint")}>{nameOf(alarm)}</code>
         </span>
       </div>
-      <span class="alarm-actions">
+      <span class="alarm-actions flex gap-4">
         {open && (
           <Button
             text={e("acknowledge")}

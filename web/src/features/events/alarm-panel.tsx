@@ -109,7 +109,7 @@ export function AlarmPanel() {
           </Toggle>
         </span>
       </div>
-      <div class="list-tools">
+      <div class="list-tools flex wrap spread">
         <Filters>
           <Select
             label={e("priority")}
@@ -129,7 +129,7 @@ export function AlarmPanel() {
           <TextInput type="search" hint={e("search")} value={text} set={setText} />
         </Filters>
         {all.length > 0 && mayAct.value && (
-          <div class="list-actions">
+          <div class="list-actions row wrap gap-8 pad-4-16-8">
             {!hello.value?.operator && <Name />}
             {openChosen.length > 0 ? (
               <Button
@@ -172,7 +172,7 @@ export function AlarmPanel() {
               : e("no_alarms_match", { count: all.length })}
         </p>
       ) : (
-        <ul class="alarm-list" aria-label={e("alarms")}>
+        <ul class="alarm-list scroll ruled" aria-label={e("alarms")}>
           {drawn.map((alarm) => (
             <AlarmLine
               key={nameOf(alarm)}
@@ -203,7 +203,7 @@ export function Filters({ children }: { children: ComponentChildren }) {
       <button class="action filters-open" aria-expanded={open} onClick={() => setOpen(!open)}>
         {e("filter")}
       </button>
-      <div class={`list-filter ${open ? "unfolded" : ""}`}>{children}</div>
+      <div class={`list-filter flex wrap gap-8 pad-4-16-8 ${open ? "unfolded" : ""}`}>{children}</div>
     </>
   );
 }
@@ -211,8 +211,8 @@ export function Filters({ children }: { children: ComponentChildren }) {
 /** The name of the operator, for consoles without accounts. */
 function Name() {
   return (
-    <label class="alarm-name">
-      {!asker.value && <span class="name-needed">{e("name_needed")}</span>}
+    <label class="alarm-name row wrap gap-4-8">
+      {!asker.value && <span class="warned">{e("name_needed")}</span>}
       <TextInput
         name="operator"
         autocomplete="username"

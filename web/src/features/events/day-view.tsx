@@ -27,7 +27,7 @@ export function DayView({ robotKey, events }: { robotKey: string; events: readon
   };
   return (
     <>
-      <div class="day-head">
+      <div class="row wrap gap-8 pad-0-16-8">
         <Button text="←" aria-label={d("earlier")} title={d("earlier")} onClick={() => step(-1)} />
         <input
           type="date"
@@ -113,7 +113,7 @@ function Sentences(props: { robotKey: string; date: string; answers: DayAnswers;
     saveFile(blob, `${name.replace("/", "-")}-${props.date}.${csv ? "csv" : "txt"}`);
   };
   return (
-    <span class="day-save">
+    <span class="flex push gap-8">
       <Button text={d("as_text")} title={d("save_hint")} onClick={() => save(false)} />
       <Button text={d("as_csv")} title={d("save_hint")} onClick={() => save(true)} />
     </span>
@@ -135,7 +135,7 @@ function Hours({
   const hours = Map.groupBy(lines, ({ ms }) => `${timeOfDay(ms).slice(0, 2)}:00`);
   return (
     <>
-      <dl class="day-totals">
+      <dl class="day-totals grid ruled gap-8-16 pad-8-16">
         {TOTALS.map((name) => (
           <div key={name} title={name === "unknown" ? d("unknown_hint") : undefined}>
             <dt class="dim small">{d(name)}</dt>
@@ -144,9 +144,12 @@ function Hours({
         ))}
       </dl>
       {gaps.length > 0 && (
-        <Warning class="day-gaps state warning" text={<span>{[d("incomplete"), ...gaps].join(" ")}</span>} />
+        <Warning
+          class="day-gaps flex gap-8 pad-8-16 state warning"
+          text={<span>{[d("incomplete"), ...gaps].join(" ")}</span>}
+        />
       )}
-      <div class="day-hours" tabIndex={0} role="group" aria-label={d("day")}>
+      <div class="day-hours scroll ruled pad-0-16-8" tabIndex={0} role="group" aria-label={d("day")}>
         {lines.length === 0 && <p class="empty">{d(answers.day.from > Date.now() ? "future" : "nothing")}</p>}
         {[...hours].map(([hour, some]) => (
           <section key={hour} aria-label={hour}>
@@ -168,7 +171,7 @@ function Sentence({ line }: { line: DayLine }) {
     <li>
       <time title={timeText(line.ms)}>{timeOfDay(line.ms)}</time>
       <span class="dim small">{d(`kind_${line.kind}`)}</span>
-      <span class="day-text">
+      <span class="day-text break">
         {line.bad && <span class="shape warning" aria-hidden="true" />}
         {line.withdrawn ? <del>{line.text}</del> : wordsOf(line)}
       </span>

@@ -6,7 +6,7 @@ import "./events-page.css";
 
 export function EventsPage() {
   return (
-    <div class="events-page">
+    <div class="events-page grid wide gap-8 pad-8">
       <AlarmPanel />
       <Journal />
     </div>

@@ -174,12 +174,12 @@ export function Journal() {
           />
         )}
         {kind === "notes" && (
-          <button class="action list-end" onClick={() => void readOlderNotes()}>
+          <button class="action push" onClick={() => void readOlderNotes()}>
             {n("older")}
           </button>
         )}
         {kind === "requests" && (
-          <button class="action list-end" title={e("older_hint")} onClick={() => void search()}>
+          <button class="action push" title={e("older_hint")} onClick={() => void search()}>
             {e("older")}
           </button>
         )}
@@ -242,10 +242,10 @@ function Line(props: { entry: Entry; open: boolean; withdrawn: boolean; choose: 
   const { entry, open, choose } = props;
   const stamp = "event" in entry ? entry.event.timestamp : entry.audit.timestamp;
   return (
-    <button class="journal-line" aria-expanded={open} onClick={() => choose(entry)}>
+    <button class="journal-line grid wide left gap-0-12 pad-0-16" aria-expanded={open} onClick={() => choose(entry)}>
       <time title={stampFull(stamp)}>{dayTime(entry.ms)}</time>
       <span class="journal-of">{entry.robot === "-" ? entry.site : `${entry.site}/${entry.robot}`}</span>
-      <span class="journal-text">
+      <span class="journal-text clip">
         <Withdrawable withdrawn={props.withdrawn}>
           {"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}
         </Withdrawable>
@@ -290,7 +290,7 @@ function Details({ entry, withdrawn, close }: { entry: Entry; withdrawn: boolean
     ...Object.entries(event?.values ?? audit?.values ?? {}),
   ];
   return (
-    <div class="entry-details" role="region" aria-label={e("entry")}>
+    <div class="entry-details ruled pad-8-16" role="region" aria-label={e("entry")}>
       <p>{"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}</p>
       {!original.includes(event ? eventText(event) : audit ? entryText(audit) : "") && (
         <p class="dim">

@@ -27,7 +27,14 @@ export function VirtualList<Item>(props: {
   const first = Math.max(0, Math.min(items.length, Math.floor(scrolled.top / lineHeight)) - OVER);
   const last = Math.min(items.length, Math.ceil((scrolled.top + scrolled.height) / lineHeight) + OVER);
   return (
-    <div ref={place} class="virtual-list" tabIndex={0} role="group" aria-label={props.label} onScroll={updateWindow}>
+    <div
+      ref={place}
+      class="virtual-list scroll ruled"
+      tabIndex={0}
+      role="group"
+      aria-label={props.label}
+      onScroll={updateWindow}
+    >
       <ol style={{ height: `${items.length * lineHeight}px` }}>
         {items.slice(first, last).map((item, i) => (
           <li

@@ -45,7 +45,7 @@ export function FleetPage() {
   const settled = useSettled();
   return (
     <div class="fleet">
-      <div class="fleet-head">
+      <div class="fleet-head flex wrap baseline gap-16">
         <h1>{t("all_robots")}</h1>
         <span class="dim">{count(robots.length)}</span>
         <Summary states={[...states.values()]} />
@@ -62,7 +62,7 @@ export function FleetPage() {
       {[...bySite].map(([name, keys]) => (
         <section key={name} class="site" aria-label={`${t("site")} ${name}`}>
           <SiteHead site={name} robots={keys.length} />
-          <ul class={`tiles ${size}`}>
+          <ul class={`tiles grid gap-16 ${size}`}>
             {keys.map((key) => (
               <li key={key}>
                 <RobotTile robotKey={key} />
@@ -100,7 +100,7 @@ function chosen(robots: readonly string[], states: ReadonlyMap<string, StateWord
 
 function Filter({ sites }: { sites: readonly string[] }) {
   return (
-    <div class="fleet-filter">
+    <div class="fleet-filter flex wrap push gap-8">
       {sites.length > 1 && (
         <Select
           label={f("site")}
@@ -133,9 +133,9 @@ function NoMatch({ all }: { all: number }) {
 /** Placeholders until the first robots are known. */
 function Skeletons() {
   return (
-    <div class="tiles some skeletons" aria-hidden="true">
+    <div class="tiles grid gap-16 some skeletons" aria-hidden="true">
       {[0, 1, 2].map((i) => (
-        <div key={i} class="tile">
+        <div key={i} class="tile card">
           <div class="tile-picture" />
           <div class="tile-body" />
         </div>
@@ -163,7 +163,7 @@ function Summary({ states }: { states: readonly StateWord[] }) {
     ([a], [b]) => LEVELS.indexOf(a?.level ?? "normal") - LEVELS.indexOf(b?.level ?? "normal"),
   );
   return (
-    <ul class="summary" aria-label={f("state_counts")}>
+    <ul class="summary flex wrap" aria-label={f("state_counts")}>
       {sorted.map(
         ([first, ...others]) =>
           first && (
@@ -181,7 +181,7 @@ function SiteHead({ site: name, robots }: { site: string; robots: number }) {
   const latest = useMesh().get(name);
   const problems = latest && !isMeshStale(latest) ? siteProblems(latest) : [];
   return (
-    <div class="site-head">
+    <div class="site-head flex wrap baseline gap-16">
       <h2>{name}</h2>
       <span class="dim small">{count(robots)}</span>
       {problems.map((words) => (

@@ -17,7 +17,7 @@ export function RunningReplays() {
   if (shown.length === 0) return null;
   return (
     <section class="site replays" aria-label={r("replays")}>
-      <div class="site-head">
+      <div class="site-head flex wrap baseline gap-16">
         <h2>{r("replays")}</h2>
         <span class="dim small">{r("replays_words")}</span>
       </div>
@@ -32,7 +32,7 @@ export function RunningReplays() {
 
 function Line({ site, state }: { site: string; state: ReplayState }) {
   return (
-    <li class="replay-line">
+    <li class="replay-line row wrap tall-44 pad-0-16">
       <a href={robotLink(site, state.robot)}>
         <ReplayTag robot={state.ofRobot} start={stampMs(state.start)} />
       </a>

@@ -27,7 +27,7 @@ export function RobotTile({ robotKey }: { robotKey: string }) {
   const [, site = "", robot = ""] = robotKey.split("/");
   const level = visible ? stateWord(robotSnapshot(robotKey).controller.value).level : "";
   return (
-    <a ref={place} class={`tile ${level}`} href={robotLink(site, robot)} data-robot={robotKey}>
+    <a ref={place} class={`tile card ${level}`} href={robotLink(site, robot)} data-robot={robotKey}>
       {visible ? <Shown robotKey={robotKey} site={site} robot={robot} /> : <InvisibleTile robot={robot} />}
     </a>
   );
@@ -80,7 +80,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
           {stale ? (
             <span class="age">{staleText(unitAge)}</span>
           ) : (
-            <span class="tile-tags">
+            <span class="flex gap-8">
               <RobotTags state={controller?.message} />
               {description?.simulated && <Tag kind="simulated">{t("simulated")}</Tag>}
             </span>
@@ -98,14 +98,14 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
         {/* One line for each case, so that a tile's height never changes. */}
         <div class="tile-line">
           {problem ? (
-            <p class={`tile-problem ${state.level}`} title={problem}>
+            <p class={`tile-problem clip small ${state.level}`} title={problem}>
               {problem}
             </p>
           ) : (
             <AliveServices of={robotKey} />
           )}
           {alarms.length > 0 && (
-            <span class="tile-alarms" title={f("alarm_count", { count: alarms.length })}>
+            <span class="tile-alarms rigid small gap-4" title={f("alarm_count", { count: alarms.length })}>
               <PriorityMark of={worst} />
               {alarms.length > 1 && ` ×${alarms.length}`}
             </span>

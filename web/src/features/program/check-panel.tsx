@@ -46,7 +46,7 @@ function Verdict({ moved }: { moved: boolean }) {
   if (checkError.value && !checking.value) {
     return (
       <Warning
-        class="verdict warning"
+        class="verdict row wrap rigid tall-32 gap-0-8 pad-0-16-8 warning"
         role="alert"
         text={<span>{p("check_failed", { text: checkError.value })}</span>}
       />
@@ -55,7 +55,7 @@ function Verdict({ moved }: { moved: boolean }) {
   if (!answer || !checked.value) {
     const idle = draft.value?.text.trim() ? p("checking") : p("check_empty");
     return (
-      <p class="verdict dim" role="status">
+      <p class="verdict row wrap rigid tall-32 gap-0-8 pad-0-16-8 dim" role="status">
         {idle}
       </p>
     );
@@ -71,7 +71,12 @@ function Verdict({ moved }: { moved: boolean }) {
       ? p(count === 1 ? "verdict_one" : "verdict_many", { count, duration })
       : p(count ? "verdict_warns" : answer.alone ? "verdict_alone" : "verdict_ok", { count, duration });
   return (
-    <p class={`verdict ${level} ${busy ? "busy" : ""}`} role="status" data-ok={!refused} aria-busy={busy}>
+    <p
+      class={`verdict row wrap rigid tall-32 gap-0-8 pad-0-16-8 ${level} ${busy ? "busy" : ""}`}
+      role="status"
+      data-ok={!refused}
+      aria-busy={busy}
+    >
       <span class={`shape ${level}`} aria-hidden="true" />
       <strong>{words}</strong>
       <span class="dim small">
@@ -93,14 +98,14 @@ function Notes({ answer }: { answer: CheckAnswer }) {
   return (
     <>
       {notes.length > 0 && (
-        <ul class="check-notes" aria-label={p("notes")} tabIndex={0}>
+        <ul class="check-notes scroll small ruled pad-8-16" aria-label={p("notes")} tabIndex={0}>
           {notes.map((note) => (
             <li key={note}>{note}</li>
           ))}
         </ul>
       )}
       {interpolation && errorsOf(answer).length === 0 && (
-        <details class="assumed">
+        <details class="assumed small dim ruled">
           <summary>{p("assumed")}</summary>
           <p>{interpolation}</p>
         </details>
@@ -121,18 +126,18 @@ function Row({ group: { worst, first, last, fromS, untilS } }: { group: Violatio
     if (line > 0) goToLine(line);
   };
   return (
-    <button class="violation" aria-current={current} onClick={show}>
-      <span class={`violation-kind ${level}`}>
+    <button class="violation grid wide small left tall-44 gap-0-8 pad-4-8" aria-current={current} onClick={show}>
+      <span class={`violation-kind row bold ${level}`}>
         <span class={`shape ${level}`} aria-hidden="true" />
         {known ? p(known) : kind}
       </span>
-      <span class="violation-where dim">
+      <span class="right dim">
         {line > 0 && (first < last ? p("lines_to", { first, last }) : p("line", { line }))}
         {!isText &&
           ` · ${untilS > fromS + 0.05 ? p("from_to", { from: seconds(fromS), to: seconds(untilS) }) : seconds(fromS)}`}
         {distance !== undefined && pair.length > 0 && ` · ${distance > 0 ? distanceText(distance) : p("touch")}`}
       </span>
-      <span class="violation-text">{reasonText(worst.reason, text) || pair.join(" – ") || t("state_unknown")}</span>
+      <span class="whole-row break">{reasonText(worst.reason, text) || pair.join(" – ") || t("state_unknown")}</span>
     </button>
   );
 }

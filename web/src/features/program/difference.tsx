@@ -17,7 +17,7 @@ export function Difference(props: { oldText: string; newText: string; whole: str
   const removed = rows.filter(({ kind }) => kind === "old").length;
   const added = rows.filter(({ kind }) => kind === "new").length;
   return (
-    <div class="difference" role="region" aria-label={s("difference")}>
+    <div class="grid gap-8" role="region" aria-label={s("difference")}>
       <div class="stored-tools">
         <Choice label={s("view")} values={VIEWS} chosen={view} text={(each) => s(each)} choose={setView} />
         <span class="dim small">
@@ -71,7 +71,7 @@ function Half({ row, side }: { row: Row | null; side: "old" | "new" }) {
 
 function LineNumber({ row, of, half }: { row: Row; of: "old" | "new"; half?: boolean }) {
   const number = of in row ? row[of as keyof Row] : "";
-  return <td class={`diff-number ${half ? `diff-${row.kind}` : ""}`}>{number}</td>;
+  return <td class={`diff-number dim right ${half ? `diff-${row.kind}` : ""}`}>{number}</td>;
 }
 
 function Line({ row, half }: { row: Row; half?: boolean }) {

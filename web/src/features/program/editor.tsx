@@ -34,8 +34,8 @@ export function Editor() {
       title={p("text")}
       end={<span class="dim small">{p(lines.length === 1 ? "one_line" : "lines", { count: lines.length })}</span>}
     >
-      <div class="editor" style={{ "--digits": String(digits) }}>
-        <div class="editor-lines">
+      <div class="editor grow ruled" style={{ "--digits": String(digits) }}>
+        <div class="editor-lines flex anchor">
           {[...marksOf(lines)].map(([line, mark]) => (
             <div key={line} class={`editor-band ${mark}`} style={{ top: `${8 + (line - 1) * LINE_PX}px` }}>
               <span class="editor-sign" aria-hidden="true">
@@ -43,10 +43,10 @@ export function Editor() {
               </span>
             </div>
           ))}
-          <pre class="editor-numbers" aria-hidden="true">
+          <pre class="editor-numbers rigid dim right" aria-hidden="true">
             {lines.map((_, index) => String(index + 1).padStart(digits)).join("\n")}
           </pre>
-          <pre class="editor-paint" aria-hidden="true">
+          <pre class="editor-paint grow anchor" aria-hidden="true">
             {lines.map((line, index) => (
               <Line key={index} text={line} />
             ))}

@@ -118,7 +118,7 @@ export function MotionCurves() {
   return (
     <>
       <div class="plot" ref={place} />
-      <div class="legend">
+      <div class="legend flex wrap small dim gap-0-16 pad-0-16">
         {joints.map((joint, i) => (
           <span key={joint.name}>
             <span class={`curve curve-${(i % CURVES.length) + 1}`} aria-hidden="true" />

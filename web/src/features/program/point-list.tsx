@@ -28,9 +28,9 @@ export function PointList({ tell }: { tell: (words: Words) => void }) {
     const lines = uses.map((line) => line - (line > point.line ? 1 : 0)).join(", ");
     tell(() => (uses.length ? p("deleted_used", { name: point.name, lines }) : p("deleted", { name: point.name })));
   };
-  if (points.length === 0) return <p class="points-none dim">{p("no_points")}</p>;
+  if (points.length === 0) return <p class="pad-0-16 dim">{p("no_points")}</p>;
   return (
-    <ul class="points" aria-label={p("points")}>
+    <ul class="points pad-0-16" aria-label={p("points")}>
       {points.map((point) => (
         <li key={`${point.line} ${point.name}`}>
           {naming === point.name ? (
@@ -59,7 +59,7 @@ export function PointList({ tell }: { tell: (words: Words) => void }) {
               {point.name}
             </button>
           )}
-          <span class="point-value dim small" title={point.numbers.join(" ")}>
+          <span class="clip dim small" title={point.numbers.join(" ")}>
             {p(`by_${point.kind}`)} {point.numbers.join(" ")}
           </span>
           <Button

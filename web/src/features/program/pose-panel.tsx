@@ -26,7 +26,7 @@ export function PosePanel() {
     pose && teachPose(poseOf(numbers.map((each, i) => (i === index ? value : each))));
   return (
     <>
-      <div class="gizmo-row">
+      <div class="gizmo-row row spread gap-8">
         <span class="dim small">{p("gizmo")}</span>
         <Choice
           label={p("gizmo")}
@@ -36,7 +36,7 @@ export function PosePanel() {
           choose={(each) => (gizmoMode.value = each)}
         />
       </div>
-      <div class="pose-fields">
+      <div class="pose-fields grid gap-8">
         {[...AXES, ...ANGLES].map((name, index) => (
           <PoseField
             key={name}

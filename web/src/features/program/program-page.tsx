@@ -55,7 +55,7 @@ export function ProgramPage({ shown, sha256 }: { shown: RobotName | null; sha256
 function Choose() {
   const robots = fleetRobots.value.map((key) => key.split("/").slice(1) as [string, string]);
   return (
-    <div class="program-choose">
+    <div class="program-choose grid wide gap-8">
       <h1>{p("choose")}</h1>
       <p class="dim">{p("choose_words")}</p>
       {robots.length === 0 && <p class="dim">{t("no_robots")}</p>}
@@ -147,7 +147,7 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
   return (
     <>
       <RobotAlarm state={state} events={events} />
-      <div class="program">
+      <div class="program grid grow short gap-8 pad-8">
         <div class="headline">
           <h1>{p("program_of", { robot })}</h1>
           <State state={stateWord(controller, events)} told />
@@ -155,11 +155,11 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
           <a class="page-link" href={robotLink(site, robot)}>
             {p("to_robot")}
           </a>
-          <span class="dim small told" role="status">
+          <span class="dim small told grow right" role="status">
             {outcome()}
           </span>
         </div>
-        <div class="program-left">
+        <div class="stack narrow short gap-8">
           <Toolbar tell={setOutcome} />
           {/* The editor stays mounted: its field takes what is opened. */}
           <div class="program-text" hidden={shown.value !== null}>
@@ -168,8 +168,8 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
           {shown.value && <StoredPanel robotKey={key} />}
           <CheckPanel moved={!isRunning() && hasMoved(positions)} />
         </div>
-        <div class="program-middle">
-          <div class="messages">
+        <div class="program-middle stack narrow short gap-8">
+          <div class="messages stack anchor gap-8 pad-0-8">
             <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
           </div>
           <SceneView
@@ -182,7 +182,7 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
           />
           <Timeline />
         </div>
-        <div class="program-right">
+        <div class="program-right stack narrow short gap-8">
           <ControlPanel
             robotKey={key}
             controller={controller}

@@ -46,7 +46,7 @@ export function Versions(props: {
       </div>
       {form === "rename" && (
         <form
-          class="stored-rename"
+          class="stored-rename flex wrap gap-8"
           onSubmit={(event) => {
             event.preventDefault();
             setForm("");
@@ -72,7 +72,7 @@ export function Versions(props: {
         {content.versions.toReversed().map((each) => (
           <li key={each.number}>
             <button
-              class="version"
+              class="version grid baseline wide break left tall-32 gap-8 pad-4-8"
               aria-current={each.number === version.number}
               onClick={() => void showVersion(robotKey, program.id, each.number)}
             >
@@ -89,7 +89,7 @@ export function Versions(props: {
         ))}
       </ol>
       <div class="stored-tools">
-        <label class="compare">
+        <label class="compare row gap-8">
           <span class="dim small">{s("compare_with")}</span>
           <select
             value={against ?? "draft"}

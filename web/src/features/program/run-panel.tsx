@@ -45,7 +45,7 @@ export function RunPanel(props: { robotKey: string; controller: ControllerState 
   const busy = notice?.kind === "busy";
   return (
     <Panel name="run-panel" title={p("run")}>
-      <div class="run-row">
+      <div class="run-row flex wrap gap-8 pad-0-16-8">
         <button class="action primary run" data-moves disabled={why !== "" || busy} title={why} onClick={run}>
           {p("run_named", { name })}
         </button>
@@ -78,9 +78,9 @@ function Progress({ state }: { state: ProgramState }) {
   const [kept, level] = OUTCOMES[outcome] ?? [undefined, "warning"];
   const word = kept ? p(kept) : String(outcome);
   return (
-    <div class="progress" role="group" aria-label={p("progress")} data-outcome={Outcome[outcome]}>
+    <div class="progress grid gap-4 pad-0-16-8" role="group" aria-label={p("progress")} data-outcome={Outcome[outcome]}>
       {/* Only this is announced: the rest changes each second. */}
-      <p class="progress-head" role="status">
+      <p class="progress-head flex wrap baseline gap-0-8" role="status">
         <span class={`state ${level}`}>
           <span class={`shape ${level}`} aria-hidden="true" />
           {word}
@@ -93,7 +93,7 @@ function Progress({ state }: { state: ProgramState }) {
         value={outcome === Outcome.DONE ? steps : Math.max(0, step - 1)}
         aria-label={name}
       />
-      <p class="progress-line">
+      <p class="progress-line flex wrap baseline gap-0-8">
         {line > 0 && <span class="dim">{p("line", { line })}</span>} <code>{statement}</code>
         <span class="dim small">
           {p("step_of", { step, steps })}
@@ -103,7 +103,7 @@ function Progress({ state }: { state: ProgramState }) {
         </span>
       </p>
       {text && (
-        <p class="progress-text" role="status">
+        <p class="progress-text break small" role="status">
           {reasonText(state.reason, text)}
         </p>
       )}

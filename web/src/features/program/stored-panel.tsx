@@ -33,7 +33,7 @@ export function StoredPanel({ robotKey }: { robotKey: string }) {
         </>
       }
     >
-      <div class="stored-body">
+      <div class="stored-body stack grow short scroll ruled gap-8 pad-8">
         {now?.kind === "list" && <List robotKey={robotKey} />}
         {now?.kind === "program" && <Versions key={now.content.program?.id} robotKey={robotKey} {...now} />}
         {now?.kind === "conflict" && <Conflict robotKey={robotKey} {...now} />}
@@ -78,7 +78,7 @@ function List({ robotKey }: { robotKey: string }) {
           const [version, author] = [current?.number ?? 0, current?.author ?? ""];
           return (
             <li key={id} aria-current={draft.value?.base?.id === id}>
-              <span class="stored-name">
+              <span class="stored-name grid narrow break">
                 <strong>{name}</strong>
                 <span class="dim small">
                   {isDeleted(program) && `${s("deleted")} · `}
@@ -97,7 +97,7 @@ function List({ robotKey }: { robotKey: string }) {
                 onClick={() => (losesText() ? setAsking(id) : openProgram(id))}
               />
               {asking === id && (
-                <p class="stored-ask" role="alert">
+                <p class="stored-ask row wrap gap-8" role="alert">
                   <span>{s("loses", { name: draft.value?.name ?? "" })}</span>
                   <Button text={t("cancel")} onClick={() => setAsking("")} />
                   <Button primary text={s("open_anyway")} onClick={() => openProgram(id)} />

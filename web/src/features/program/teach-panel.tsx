@@ -52,7 +52,7 @@ export function TeachPanel() {
         </>
       }
     >
-      <div class="teach-row">
+      <div class="teach-row flex wrap gap-8 pad-0-16-8">
         <Button text={p("add_live")} disabled={!live} onClick={() => live && add(live)} />
         {taught ? (
           <Button text={p("end_ghost")} onClick={() => teach(null)} />
@@ -62,7 +62,7 @@ export function TeachPanel() {
       </div>
       {taught && (
         <div class="aim">
-          <div class="aim-head">
+          <div class="row wrap spread gap-8 pad-8">
             <Choice
               label={p("set_by")}
               values={METHODS}
@@ -87,11 +87,11 @@ export function TeachPanel() {
 function Sliders({ positions }: { positions: readonly number[] }) {
   const set = (index: number, value: number) => teach(positions.map((each, i) => (i === index ? value : each)));
   return (
-    <div class="joint-rows">
+    <div class="joint-rows grid pad-0-16">
       {description.value?.joints.map((joint, index) => (
         <div key={joint.name} class="joint-row">
           <span class="joint-name">{jointTitle(joint)}</span>
-          <div class="joint-range">
+          <div class="joint-range anchor">
             <JointTrack
               label={p("ghost_joint", { joint: jointTitle(joint) })}
               lower={joint.lower}

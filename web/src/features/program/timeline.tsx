@@ -43,11 +43,11 @@ export function Timeline() {
       title={p("timeline")}
       end={<Button quiet text={p("hide_ghost")} disabled={time === null} onClick={hideMoment} />}
     >
-      <div class="scrub-row">
+      <div class="scrub-row row gap-12 pad-0-16">
         <button class="action play" disabled={!any} onClick={play} aria-label={p(playing.value ? "pause" : "play")}>
           <span class={playing.value ? "pause-shape" : "play-shape"} aria-hidden="true" />
         </button>
-        <div class="scrub">
+        <div class="scrub grow narrow anchor">
           <input
             type="range"
             min={0}
@@ -64,7 +64,7 @@ export function Timeline() {
           />
           <Bands />
         </div>
-        <span class="scrub-time">
+        <span class="scrub-time nowrap right">
           {seconds(time ?? 0)} <span class="dim">/ {seconds(duration.value)}</span>
         </span>
       </div>

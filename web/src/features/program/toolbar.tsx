@@ -45,12 +45,12 @@ export function Toolbar({ tell }: { tell: (words: Words) => void }) {
   const isNew = !now?.base || now.base.name !== now.name;
   return (
     <>
-      <div class="program-tools" role="toolbar" aria-label={p("file")}>
+      <div class="program-tools flex wrap gap-8" role="toolbar" aria-label={p("file")}>
         <label class="program-name">
           <span class="dim small">{p("name")}</span>
           <TextInput maxLength={60} value={now?.name ?? ""} disabled={!now} set={rename} />
         </label>
-        <div class="program-buttons">
+        <div class="program-buttons flex wrap gap-8">
           <Button
             primary
             text={s(now?.base && isNew ? "save_as" : "save")}

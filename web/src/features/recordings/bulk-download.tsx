@@ -26,13 +26,13 @@ export function BulkDownload(props: {
   const isTooMany = rows.length > MOST_IN_ZIP;
   const all = props.shown.filter(({ recording }) => !recording.open).map(rowKey);
   return (
-    <div class="compare-line bulk-line" role="status">
+    <div class="compare-line row spread gap-16 pad-8-16 bulk-line" role="status">
       <span>
         {isTooMany
           ? r("zip_too_many", { count: rows.length, most: MOST_IN_ZIP })
           : r(rows.length === 1 ? "chosen_one" : "chosen", { count: rows.length, size: sizeText(bytes) })}
       </span>
-      <span class="bulk-does">
+      <span class="flex wrap gap-8">
         {!isTooMany && (
           <a class="action primary" href={`/recordings.zip?${query}`} download="recordings.zip" title={r("zip_hint")}>
             {r("zip")}

@@ -110,7 +110,7 @@ export function Chart(props: {
   }, [curves, shown.from, shown.to, theme.value, props.seek]);
   return (
     <figure class="chart" data-unit={words}>
-      <figcaption class="legend">
+      <figcaption class="legend flex wrap small dim gap-0-16 pad-0-16">
         <span class="chart-unit">{[common, words].filter(Boolean).join(", ")}</span>
         {curves.map((curve) => (
           <Named

@@ -32,12 +32,16 @@ export function Comparison(props: {
       ? r("compared_same", { name })
       : r("compared", { name, shift: Math.abs(shift).toFixed(2), sense: r(shift > 0 ? "earlier" : "later") });
   return (
-    <form class="beside" onSubmit={(event) => event.preventDefault()} onChange={(event) => align(event.currentTarget)}>
+    <form
+      class="beside row wrap spread gap-8-24"
+      onSubmit={(event) => event.preventDefault()}
+      onChange={(event) => align(event.currentTarget)}
+    >
       <p>
         <strong>{words}</strong> {props.ghosted && <span class="dim">{r("ghost_of", { name })}</span>}
       </p>
       {props.problem && <Warning class="state warning" role="alert" text={props.problem} />}
-      <div class="beside-row">
+      <div class="beside-row row wrap narrow gap-8">
         {events.length > 0 && secondEvents.length > 0 && (
           <>
             <span class="dim">{r("align_event")}</span>

@@ -30,7 +30,7 @@ export function Contents(props: {
   return (
     <Panel name="contents" title={r("contents")} end={info && <span class="dim">{sizeText(info.bytes)}</span>}>
       {info ? <Topics info={info} /> : <p class="skeleton contents-waiting">{"\u00a0"}</p>}
-      <div class="export">
+      <div class="export grid gap-8">
         <h3>{r("export")}</h3>
         <div class="export-row">
           <Download {...name} name={title} kind="MCAP" hint={r("download_mcap_hint")} />
@@ -56,7 +56,7 @@ function Topics({ info }: { info: Recording }) {
   const lost = lostText(info);
   return (
     <>
-      {lost && <Warning class="contents-lost state warning" text={lost} />}
+      {lost && <Warning class="contents-lost small pad-0-16-8 state warning" text={lost} />}
       <table class="topics">
         <thead>
           <tr>
@@ -105,7 +105,7 @@ function LiveVideo({ robotKey, views, title }: { robotKey: string; views: readon
 function Copyable({ text }: { text: string }) {
   const [copied, setCopied] = useState(false);
   return (
-    <div class="copyable">
+    <div class="copyable flex gap-8">
       <code tabIndex={0}>{text}</code>
       {"clipboard" in navigator && (
         <Button

@@ -143,7 +143,7 @@ export function EventList(props: {
           close={() => setNoting(false)}
         />
       )}
-      <ol class="event-list recorded-events" tabIndex={0} aria-label={r("events")}>
+      <ol class="event-list grow scroll pad-0-16-8 recorded-events" tabIndex={0} aria-label={r("events")}>
         {!value && !problem && <li class="skeleton">{"\u00a0"}</li>}
         {problem && <li class="state warning">{r("events_refused", { text: problem })}</li>}
         {value && list.length === 0 && <li class="dim">{r("no_events")}</li>}
@@ -200,7 +200,7 @@ function EventButton({ happened, seek }: { happened: RecordedEvent; seek: (to: n
       onClick={() => seek(at)}
     >
       <time>{momentText(at)}</time>
-      <span class="event-text">
+      <span class="break">
         {level !== "normal" && (
           <span class={`mark state ${level}`}>
             <span class={`shape ${level}`} aria-hidden="true" />

@@ -30,7 +30,7 @@ export function PlaybackControls(props: {
   const recordedMs = stampMs(start) + at * 1000;
   return (
     <section class="transport" aria-label={r("transport")}>
-      <div class="transport-line">
+      <div class="transport-line anchor">
         <EventMarks events={props.events} duration={durationS} seek={replay.seek} />
         <input
           type="range"
@@ -43,8 +43,8 @@ export function PlaybackControls(props: {
           onInput={(event) => replay.seek(Number(event.currentTarget.value))}
         />
       </div>
-      <div class="transport-row">
-        <div class="transport-buttons">
+      <div class="transport-row grid gap-8-16">
+        <div class="flex gap-8">
           <Press name={r("to_start")} shape="start" press={() => replay.seek(0)} />
           <Press
             name={r("step_back", { step: STEP_S })}
@@ -64,13 +64,13 @@ export function PlaybackControls(props: {
             press={() => replay.seek(replay.position() + STEP_S)}
           />
         </div>
-        <div class="transport-time">
+        <div class="transport-time flex wrap large">
           <span class="recorded-clock">{timeText(recordedMs)}</span>
           <span class="figure">
             {momentText(at)} <span class="dim">/ {momentText(durationS)}</span>
           </span>
         </div>
-        <div class="transport-end">
+        <div class="transport-end row to-end gap-8">
           <label>
             <span class="dim small">{r("speed")}</span>
             <Select

@@ -62,8 +62,13 @@ export function Player({ first, second }: { first: RecordingName; second: Record
   const events = recordedEvents.value?.list ?? NONE;
   const recorded = viewsIn(info.value);
   return (
-    <div class={`player ${second ? "two" : ""}`} role="group" aria-label={r("player")} data-replay={key.split("/")[2]}>
-      <div class="player-head">
+    <div
+      class={`player grid grow short gap-8 ${second ? "two" : ""}`}
+      role="group"
+      aria-label={r("player")}
+      data-replay={key.split("/")[2]}
+    >
+      <div class="player-head stack gap-8">
         <div class="headline">
           <a class="page-link" href={recordingsLink()}>
             {r("back")}
@@ -75,7 +80,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
           {info.problem && <Trouble text={r("info_refused", { text: info.problem })} />}
         </div>
         {trouble && (
-          <p class="player-trouble" role="alert">
+          <p class="player-trouble row wrap warned gap-8" role="alert">
             <span class="shape warning" aria-hidden="true" />
             <span>{trouble}</span>
             <Button text={r("open_again")} onClick={openReplay.again} />
@@ -103,11 +108,11 @@ export function Player({ first, second }: { first: RecordingName; second: Record
         lostAt={null}
         arm={replay ? arm : "coming"}
       />
-      <div class="player-videos">
+      <div class="player-videos stack short gap-8">
         <ReplayVideo replay={replay} arm={arm} description={description} recorded={recorded} title={r("video")} />
         {other.replay && <SecondVideo replay={other.replay} arm={otherArm} info={secondInfo.value} />}
       </div>
-      <div class="player-side">
+      <div class="player-side stack short gap-8">
         <EventList
           asked={recordedEvents}
           moment={moment}

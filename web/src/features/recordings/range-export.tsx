@@ -64,7 +64,7 @@ export function RangeExport(props: {
     setNow(null);
   };
   return (
-    <fieldset class="range-export" aria-label={r("range")}>
+    <fieldset class="range-export grid narrow gap-8 pad-8-0" aria-label={r("range")}>
       <div class="export-row">
         <Seconds label={r("range_from")} value={from} most={durationS} set={setFrom} here={props.position} />
         <Seconds label={r("range_to")} value={end} most={durationS} set={setTo} here={props.position} />
@@ -87,7 +87,7 @@ export function RangeExport(props: {
         )}
       </div>
       {now && (
-        <p class="range-progress">
+        <p class="range-progress grid gap-4">
           <progress max={1} value={now.progress ?? 0} aria-label={r(`video_${now.state}` as "video_waiting")} />
           <span class="figure small" role="status">
             {r(`video_${now.state}` as "video_waiting")} {Math.floor((now.progress ?? 0) * 100)} %
@@ -145,7 +145,7 @@ function Seconds(props: {
   const [text, setText] = useState<string | null>(null);
   const rounded = (value: number) => Math.round(Math.min(Math.max(value, 0), props.most) * 1000) / 1000;
   return (
-    <span class="range-seconds">
+    <span class="range-seconds flex gap-4">
       <label>
         <span class="dim small">{props.label}</span>
         <TextInput

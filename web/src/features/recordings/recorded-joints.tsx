@@ -13,7 +13,7 @@ export function RecordedJoints({
 }) {
   const positions = new Map(joints?.joints.map((joint) => [joint.name, joint.position]));
   return (
-    <dl class="recorded-joints">
+    <dl class="recorded-joints pad-0-16-8">
       {description?.joints.map((joint) => {
         const value = positions.get(joint.name);
         const share = value === undefined ? 0 : (value - joint.lower) / (joint.upper - joint.lower || 1);

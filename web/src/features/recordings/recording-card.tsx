@@ -51,10 +51,10 @@ export function RecordingCard(props: {
   const isFirst = first?.site === site && first.file === file;
   const compare = () => (props.first.value = isFirst ? null : { ...mine, name });
   return (
-    <li class={`recording ${open ? "open" : ""}`}>
+    <li class={`recording grid card gap-16 ${open ? "open" : ""}`}>
       <Thumbnail site={site} recording={recording} />
-      <div class="recording-body">
-        <div class="recording-title">
+      <div class="recording-body narrow pad-8-0">
+        <div class="recording-title row wrap">
           {!open && <Choose row={props.row} name={name} chosen={props.chosen} />}
           <strong title={file}>{name}</strong>
           {open && (
@@ -71,7 +71,7 @@ export function RecordingCard(props: {
             </span>
           )}
         </div>
-        <p class="recording-facts dim">
+        <p class="recording-facts flex wrap gap-0-16 dim">
           <span>{props.sited ? `${site} / ${robots}` : robots}</span>
           <time>{timeText(startMs(recording))}</time>
           <span class="figure">{momentText(durationS(recording), 0)}</span>
@@ -80,7 +80,7 @@ export function RecordingCard(props: {
           <span>{startedText(recording)}</span>
         </p>
         {recording.tags.length > 0 && (
-          <p class="recording-tags">
+          <p class="flex wrap gap-4-8">
             {recording.tags.map((each) => (
               <span key={each} class="tag">
                 {each}
@@ -89,17 +89,17 @@ export function RecordingCard(props: {
           </p>
         )}
         {recording.note && <p class="recording-note">{recording.note}</p>}
-        {recording.cause && <p class="recording-words">{r("cause", { text: recording.cause })}</p>}
+        {recording.cause && <p class="recording-words break small">{r("cause", { text: recording.cause })}</p>}
         {(lost || recording.problem || empty) && (
           <Warning
-            class="recording-words state warning"
+            class="recording-words break small state warning"
             text={[reasonText(recording.problemReason, recording.problem) || (empty && r("nothing_written")), lost]
               .filter(Boolean)
               .join("; ")}
           />
         )}
       </div>
-      <div class="recording-does">
+      <div class="recording-does flex gap-8">
         {open && mayAct.value && !isOfFlight(recording) && <Stop row={props.row} name={name} />}
         {!empty && (
           <>

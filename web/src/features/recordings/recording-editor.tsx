@@ -42,7 +42,7 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
     void attempt(saveLabels(seen, { name: name.trim(), note: note.trim(), tags: list }));
   };
   return (
-    <div class="recording-editor">
+    <div class="recording-editor whole-row ruled">
       <form
         aria-label={r("edit_of", { name: title })}
         onKeyDown={(event) => event.key === "Escape" && close()}
@@ -59,7 +59,7 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
           <span class="dim small">{r("tags_hint")}</span>
           <TextInput value={tags} set={setTags} />
         </label>
-        <label class="editor-note">
+        <label class="whole-row">
           <span class="dim small">{r("note")}</span>
           <textarea
             rows={3}
@@ -68,11 +68,11 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
             onInput={(event) => setNote(event.currentTarget.value)}
           />
         </label>
-        <div class="editor-row">
+        <div class="whole-row flex wrap gap-8">
           <Button primary text={r("save")} type="submit" disabled={busy || !name.trim()} />
           <Button text={r("cancel")} type="button" disabled={busy} onClick={close} />
           {!seen.recording.open && (
-            <button type="button" class="action editor-delete" disabled={busy} onClick={() => setDeleting(true)}>
+            <button type="button" class="action push" disabled={busy} onClick={() => setDeleting(true)}>
               {r("delete")}
             </button>
           )}

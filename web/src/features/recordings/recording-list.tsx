@@ -43,10 +43,10 @@ export function RecordingList() {
   useEffect(() => () => void (first.value = null), []);
   return (
     <div class="recordings">
-      <div class="fleet-head">
+      <div class="fleet-head flex wrap baseline gap-16">
         <h1>{r("recordings")}</h1>
         <span class="dim">{countText(shown.length, rows.length)}</span>
-        <div class="recordings-filters">
+        <div class="recordings-filters flex narrow push gap-8">
           <TextInput
             type="search"
             placeholder={r("search_short")}
@@ -83,7 +83,7 @@ export function RecordingList() {
         <SiteLine key={site} site={site} answer={answer} named={sites.size > 1} />
       ))}
       {first.value && (
-        <p class="compare-line" role="status">
+        <p class="compare-line row spread gap-16 pad-8-16" role="status">
           <span>{r("compare_second", { name: first.value.name })}</span>
           <Button text={r("cancel")} onClick={() => (first.value = null)} />
         </p>
@@ -92,7 +92,7 @@ export function RecordingList() {
       {waiting && rows.length === 0 ? (
         <Skeleton />
       ) : (
-        <ol class="recording-list" aria-label={r("recordings")}>
+        <ol class="grid gap-8" aria-label={r("recordings")}>
           {shown.map((row) => (
             <RecordingCard key={rowKey(row)} row={row} sited={sites.size > 1} first={first} chosen={chosen} />
           ))}
@@ -152,7 +152,7 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
   const low = free < LOW_BYTES;
   const full = free < FULL_BYTES;
   return (
-    <div class="recorder-line">
+    <div class="recorder-line row wrap pad-8-0">
       {named && <strong>{site}</strong>}
       {list && (
         <>
@@ -168,7 +168,7 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
             </span>
           )}
           {list.flight && chosen && (
-            <span class="save-last">
+            <span class="flex gap-8">
               {robots.length > 1 && (
                 <Select label={r("robot")} value={chosen} values={robots} text={String} choose={setOf} />
               )}
@@ -189,11 +189,11 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
 
 function Skeleton() {
   return (
-    <ol class="recording-list" aria-hidden="true">
+    <ol class="grid gap-8" aria-hidden="true">
       {[0, 1, 2].map((each) => (
-        <li key={each} class="recording">
+        <li key={each} class="recording grid card gap-16">
           <span class="thumbnail" />
-          <div class="recording-body">
+          <div class="recording-body narrow pad-8-0">
             <p class="skeleton">{"\u00a0"}</p>
             <p class="skeleton">{"\u00a0"}</p>
           </div>

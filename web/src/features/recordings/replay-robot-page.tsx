@@ -40,8 +40,8 @@ export function ReplayRobotPage({ site, robot }: RobotName) {
   if (search !== "found") return <NoRobot search={search} site={site} robot={robot} />;
   const state = latest?.message;
   return (
-    <div class="player of-robot" data-replay={robot}>
-      <div class="player-head">
+    <div class="player grid grow short gap-8 of-robot" data-replay={robot}>
+      <div class="player-head stack gap-8">
         <div class="headline">
           <h1>{robot}</h1>
           <ReplayTag robot={state?.ofRobot ?? description?.replay?.robot ?? ""} start={stampMs(state?.start)} />
@@ -52,7 +52,7 @@ export function ReplayRobotPage({ site, robot }: RobotName) {
             </a>
           )}
         </div>
-        {gone && <Warning class="player-trouble" role="alert" text={r("player_gone")} />}
+        {gone && <Warning class="player-trouble row wrap warned gap-8" role="alert" text={r("player_gone")} />}
       </div>
       <SceneView
         key={key}
@@ -63,10 +63,10 @@ export function ReplayRobotPage({ site, robot }: RobotName) {
         lostAt={null}
         arm={arm}
       />
-      <div class="player-videos">
+      <div class="player-videos stack short gap-8">
         <ReplayVideo replay={replay} arm={arm} description={description} recorded={NONE} title={r("video")} />
       </div>
-      <div class="player-side">
+      <div class="player-side stack short gap-8">
         <Panel name="joints" title={r("joints")}>
           <RecordedJoints description={description} joints={arm === "here" ? joints : undefined} />
         </Panel>

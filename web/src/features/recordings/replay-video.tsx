@@ -54,7 +54,7 @@ export function ReplayVideo(props: {
         </>
       }
     >
-      <div class="picture" data-moment={state}>
+      <div class="picture grow short anchor" data-moment={state}>
         {live.picture}
         {shown && word && <p class="picture-word dim">{word}</p>}
       </div>

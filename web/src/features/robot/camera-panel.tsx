@@ -78,7 +78,7 @@ export function CameraPanel(props: {
       end={
         <>
           {live.step > 0 && (
-            <span class="reduced" title={t("reduced_hint")}>
+            <span class="clip small warned" title={t("reduced_hint")}>
               {t("reduced")}
             </span>
           )}
@@ -95,12 +95,12 @@ export function CameraPanel(props: {
         </>
       }
     >
-      <div ref={picture} class={`picture ${live.stale ? "stale" : ""}`}>
+      <div ref={picture} class={`picture grow short anchor ${live.stale ? "stale" : ""}`}>
         {live.picture}
         {!live.any && (
           <p class="picture-word dim">{isOff ? t("video_is_off") : t("camera_waiting", { view: viewText(shown) })}</p>
         )}
-        <div class="picture-tools">
+        <div class="picture-tools flex gap-4">
           <Button quiet text={t("save_still")} disabled={!live.any} onClick={() => void savePicture()} />
           {shown !== OWN_VIEW && !isOff && (
             <Button

@@ -49,7 +49,7 @@ export function EventsPanel(props: {
       ) : shown === "signals" && signals ? (
         <SignalList signals={signals} description={props.description} />
       ) : (
-        <ol class="event-list" tabIndex={0} aria-label={textOf(shown)}>
+        <ol class="event-list grow scroll pad-0-16-8" tabIndex={0} aria-label={textOf(shown)}>
           {empty && <li class="dim">{t("no_events")}</li>}
           {shown === "events"
             ? events.map((event, i) => (
@@ -76,7 +76,7 @@ function EventLine({ event, withdrawn }: { event: Event; withdrawn: boolean }) {
   return (
     <li title={`${stampFull(event.timestamp)} · ${event.source} · ${event.code}`}>
       <time>{stampTime(event.timestamp)}</time>
-      <span class="event-text">
+      <span class="break">
         {mark.level !== "normal" && <Mark {...mark} />}
         <span lang={text === event.text ? "en" : undefined}>
           <Withdrawable withdrawn={withdrawn && event.code === WRITTEN}>{text}</Withdrawable>
@@ -99,11 +99,11 @@ function AuditLine(props: {
   return (
     <li title={`${stampFull(entry.timestamp)} · ${entry.source} · ${entry.request}`}>
       <time>{stampTime(entry.timestamp)}</time>
-      <span class="event-text">
+      <span class="break">
         {mark.level !== "normal" && <Mark {...mark} />}
         {entrySentence(entry, props.joints, props.took)}
         {entry.repeatedCount > 0n && (
-          <strong class="repeated" title={t("repeated", { count: count(entry.repeatedCount) })}>
+          <strong class="nowrap" title={t("repeated", { count: count(entry.repeatedCount) })}>
             {` × ${count(entry.repeatedCount)}`}
           </strong>
         )}

@@ -144,20 +144,20 @@ export function JointsPanel(props: {
       end={
         <>
           {props.controller?.jointsUnproven && (
-            <Warning as="strong" class="joints-unproven" text={t("joints_unproven_short")} />
+            <Warning as="strong" class="nowrap small warned bold" text={t("joints_unproven_short")} />
           )}
           {props.age === undefined ? <span class="dim">{t("no_data")}</span> : <Age stale={stale} age={props.age} />}
           {watching || (
             <>
-              <span class="step-label dim">{t("step")}</span>
+              <span class="step-label small dim">{t("step")}</span>
               <Choice label={t("step")} values={STEPS} chosen={size} text={(each) => each} choose={setSize} />
             </>
           )}
-          <span class="step-unit dim">{units}</span>
+          <span class="step-unit small dim">{units}</span>
         </>
       }
     >
-      <div class="joint-rows">
+      <div class="joint-rows grid pad-0-16">
         {rows.length === 0 && Array.from({ length: 5 }, (_, i) => <div key={i} class="joint-row skeleton" />)}
         {rows.map((joint, index) => {
           const position = current[index];
@@ -189,7 +189,7 @@ export function JointsPanel(props: {
                 {jointTitle(joint)}
               </span>
               {stepBy(-1)}
-              <div class="joint-range">
+              <div class="joint-range anchor">
                 <JointTrack
                   label={t("joint_target", { joint: jointTitle(joint) })}
                   lower={joint.lower}
@@ -237,6 +237,6 @@ export function JointsPanel(props: {
 }
 
 function Limit({ text, refused }: { text: string; refused: boolean }) {
-  if (!refused) return <span class="limit dim">{text}</span>;
-  return <Warning as="strong" class="limit refused" text={text} />;
+  if (!refused) return <span class="limit small dim">{text}</span>;
+  return <Warning as="strong" class="limit small refused" text={text} />;
 }

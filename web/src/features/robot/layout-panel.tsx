@@ -60,9 +60,9 @@ export function LayoutPanel(props: LayoutState & { site: string }) {
   return (
     <section class="panel layout-panel" aria-label={p("layout")}>
       {problem && (
-        <div class="layout-row">
+        <div class="layout-row row wrap gap-8-16 pad-8-16">
           <Warning
-            class="layout-problem"
+            class="layout-problem break warned"
             role="alert"
             text={p("layout_wrong", { why: p(problem.text, problem.values) })}
           />
@@ -70,7 +70,7 @@ export function LayoutPanel(props: LayoutState & { site: string }) {
         </div>
       )}
       {shown.value && (
-        <div class="layout-row">
+        <div class="layout-row row wrap gap-8-16 pad-8-16">
           {PANELS.map((each) => (
             <label key={each}>
               <input
@@ -95,7 +95,7 @@ export function LayoutPanel(props: LayoutState & { site: string }) {
               onClick={() => setLayoutQuery("")}
             />
           )}
-          <button class="quiet layout-close" onClick={() => (shown.value = false)}>
+          <button class="quiet push" onClick={() => (shown.value = false)}>
             {p("close")}
           </button>
         </div>

@@ -86,7 +86,11 @@ export function LinkFacts({ controller }: { controller: Latest<ControllerState> 
   const stale = isStale("controller", ageOf(controller));
   const capabilities = capabilitiesText(state);
   return (
-    <dl class={`facts-list ${stale ? "stale" : ""}`} tabIndex={0} aria-label={t("link")}>
+    <dl
+      class={`facts-list grid grow short scroll small pad-0-16-8 ${stale ? "stale" : ""}`}
+      tabIndex={0}
+      aria-label={t("link")}
+    >
       {capabilities && (
         <div class="whole">
           <dt>{t("can")}</dt>

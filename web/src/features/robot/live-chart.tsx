@@ -182,7 +182,7 @@ export function LiveChart(props: {
   useEffect(() => redraw.current(), [props.frozen, props.zoomed, past]);
   return (
     <div class="plot" ref={place} role="img" aria-label={`${props.label}. ${p("zoom_hint")}`}>
-      {!any && <p class="plot-word dim">{p("waiting")}</p>}
+      {!any && <p class="plot-word grid center dim">{p("waiting")}</p>}
     </div>
   );
 }

@@ -9,7 +9,7 @@ import { Warning } from "../../ui/warning";
 export function TopicChoice({ robotKey }: { robotKey: string }) {
   if (!isRemote(robotKey)) return null;
   return (
-    <span class="far-choice" title={t("far_hint")}>
+    <span class="inline-row nowrap small gap-8" title={t("far_hint")}>
       <span class="dim">{t("far_link")}</span>
       <Choice
         label={t("far_link")}

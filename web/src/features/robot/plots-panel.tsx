@@ -64,7 +64,7 @@ export function PlotsPanel(props: {
       end={
         <>
           {pausedAt !== null && (
-            <span class="paused-at">
+            <span class="nowrap warned">
               {p("paused_at", { time: whenText(Date.now() - ageClock() + pausedAt * 1000) })}
             </span>
           )}
@@ -81,7 +81,7 @@ export function PlotsPanel(props: {
         </>
       }
     >
-      <div class="plot-cards">
+      <div class="plot-cards stack grow short">
         {plots.length === 0 && <p class="plot-none dim">{p("no_plots")}</p>}
         {plots.map((plot, i) => (
           <PlotCard
@@ -130,10 +130,10 @@ function PlotCard(props: {
     if (shown && pausedAt === null) props.pause(ageClock() / 1000);
   };
   return (
-    <section class="plot-card" aria-label={title}>
-      <div class="plot-head">
+    <section class="plot-card stack" aria-label={title}>
+      <div class="plot-head flex spread gap-8">
         <Legend {...{ fields, feed, description, common, unit, frozen, moment, seconds }} />
-        <div class="plot-tools">
+        <div class="plot-tools row gap-4">
           {zoomed && <Button quiet text={p("whole")} onClick={() => zoom(null)} />}
           <Select
             label={p("range", { number })}
@@ -164,7 +164,7 @@ function PlotCard(props: {
         />
       ) : fields.length === 0 ? (
         <div class="plot">
-          <p class="plot-word dim">{p("no_fields")}</p>
+          <p class="plot-word grid center dim">{p("no_fields")}</p>
         </div>
       ) : (
         <LiveChart
@@ -200,7 +200,7 @@ function PastLine(props: { past: Past; fields: readonly string[]; feed: PlotFeed
         : past.recorded.length === 0
           ? p("past_none")
           : p("past_lacks", { time: ageText(lacking) });
-  return <p class={`footnote ${past.problem ? "past-problem" : "dim"}`}>{text}</p>;
+  return <p class={`footnote ${past.problem ? "warned" : "dim"}`}>{text}</p>;
 }
 
 /** Return copies of the plot's curves as they were when it was paused; null: it is live. */
@@ -229,7 +229,10 @@ function Legend(props: {
   now.value; // the values four times a second
   const held = Math.max(1, seconds / 100);
   return (
-    <ul class="legend" {...(props.common && { "aria-label": partText(props.common) })}>
+    <ul
+      class="legend flex wrap small dim gap-0-16 pad-0-16"
+      {...(props.common && { "aria-label": partText(props.common) })}
+    >
       {props.common && <li aria-hidden="true">{partText(props.common)}</li>}
       {fields.map((name, i) => {
         const { factor, decimals, unit } = shownUnit(props.unit(name));

@@ -83,8 +83,8 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
   return (
     <section class="panel record-panel" aria-label={r("record")}>
       {open && recording ? (
-        <div class="record-row">
-          <strong class="record-name">{recording.name}</strong>
+        <div class="record-row row wrap gap-8-16 pad-8-16">
+          <strong class="break">{recording.name}</strong>
           <Counts recording={recording} />
           <Button
             text={r("record_stop")}
@@ -120,7 +120,7 @@ function Start(props: {
   const [views, setViews] = useState(AS_THE_SITE);
   return (
     <form
-      class="record-row"
+      class="record-row row wrap gap-8-16 pad-8-16"
       onSubmit={(event) => {
         event.preventDefault();
         props.start(name.trim().replace(/\s+/g, "-"), views ? [views] : []);
@@ -157,12 +157,12 @@ function sourceText(views: string): string {
 function Last({ site, recording }: { site: string; recording: Recording | undefined }) {
   if (!recording?.name)
     return (
-      <a class="record-last" href={recordingsLink()}>
+      <a class="clip push" href={recordingsLink()}>
         {r("back")}
       </a>
     );
   return (
-    <span class="record-last dim">
+    <span class="clip push dim">
       {r("record_last")}
       <a href={recordingsLink({ site, file: recording.file })}>{recording.name}</a>
     </span>
@@ -172,7 +172,7 @@ function Last({ site, recording }: { site: string; recording: Recording | undefi
 function Counts({ recording }: { recording: Recording }) {
   const lost = lostText(recording);
   return (
-    <p class="record-counts">
+    <p class="record-counts flex wrap gap-0-16">
       <span class="figure">{momentText(durationS(recording), 0)}</span>
       <span class="figure">{r("messages", { count: count(messagesOf(recording)) })}</span>
       <span class="figure">{sizeText(recording.bytes)}</span>

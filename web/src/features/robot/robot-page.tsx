@@ -80,7 +80,7 @@ export function RobotPage({ site, robot }: RobotName) {
   return (
     <>
       <RobotAlarm state={state} events={events} />
-      <div class={`robot ${layoutClasses(layout)} ${holds(key) ? "in-control" : ""}`}>
+      <div class={`robot grid grow short gap-8 pad-8 ${layoutClasses(layout)} ${holds(key) ? "in-control" : ""}`}>
         <Headline
           site={site}
           name={robot}
@@ -99,7 +99,7 @@ export function RobotPage({ site, robot }: RobotName) {
           camera={layout.camera}
           setCamera={(camera) => change({ camera })}
         />
-        <div class="messages">
+        <div class="messages stack anchor gap-8 pad-0-8">
           <Troubles site={site} controller={controller} events={events} />
           {isShown(program, events) && program.message.outcome === Outcome.ENDED && <ProgramLine latest={program} />}
           <ControlRequests robotKey={key} holder={holder} lease={lease?.message} />
@@ -238,7 +238,11 @@ function Headline(props: {
         <TopicChoice robotKey={`robomesh/${props.site}/${props.name}`} />
         {/* A program replaces less important facts, so that nothing below moves. */}
         {runs || (
-          <span class="provenance dim" lang={source === description?.provenance ? "en" : undefined} title={source}>
+          <span
+            class="provenance clip small right dim"
+            lang={source === description?.provenance ? "en" : undefined}
+            title={source}
+          >
             {description && source && `${robotTitle(description)}: ${source}`}
           </span>
         )}

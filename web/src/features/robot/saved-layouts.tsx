@@ -66,7 +66,7 @@ export function SavedLayouts(props: { site: string; text: string }) {
   const able = !cannot && !busy && wanted !== "";
   return (
     <form
-      class="layout-row saved-layouts"
+      class="layout-row row wrap gap-8-16 pad-8-16 saved-layouts ruled"
       aria-label={p("saved_layouts", { site })}
       onSubmit={(event) => {
         event.preventDefault();

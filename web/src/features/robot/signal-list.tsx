@@ -28,7 +28,12 @@ export function SignalList(props: { signals: Latest<Signals>; description: Descr
     setTurned(next);
   };
   return (
-    <div class={`signal-list ${stale ? "stale" : ""}`} tabIndex={0} role="group" aria-label={sg("signals")}>
+    <div
+      class={`signal-list grow scroll small pad-0-16-8 ${stale ? "stale" : ""}`}
+      tabIndex={0}
+      role="group"
+      aria-label={sg("signals")}
+    >
       <p class="signal-age">
         <Age stale={stale} age={age} />
       </p>
@@ -36,7 +41,12 @@ export function SignalList(props: { signals: Latest<Signals>; description: Descr
         const open = some.length <= MOST_OPEN !== turned.has(group);
         return (
           <section key={group}>
-            <button type="button" class="quiet signal-group" aria-expanded={open} onClick={() => turn(group)}>
+            <button
+              type="button"
+              class="quiet signal-group row wide bold left gap-8"
+              aria-expanded={open}
+              onClick={() => turn(group)}
+            >
               <span aria-hidden="true">{open ? "▾" : "▸"}</span>
               {sg("group", { group: groupTitle(group), count: some.length })}
             </button>

@@ -46,7 +46,7 @@ export function Accounts() {
     <Panel name="accounts" title={s("accounts")}>
       <p class="footnote dim">{s("accounts_words")}</p>
       <div class="table-place" tabIndex={0} role="region" aria-label={s("accounts")}>
-        <table class="seen-table">
+        <table class="seen-table wide nowrap">
           <thead>
             <tr>
               {(["account", "role", "state", "created"] as const).map((name) => (
@@ -99,7 +99,7 @@ function Row({ account, change }: { account: Account; change: Change }) {
         {disabled ? s("disabled") : account.sessions ? s("sessions_of", { count: account.sessions }) : s("active")}
       </td>
       <td>{timeText(Date.parse(account.created))}</td>
-      <td class="account-actions">
+      <td class="account-actions right">
         {own ? null : openForm === "password" ? (
           <Password of={name} set={(password) => run("password", { password })} close={() => setOpen(null)} />
         ) : openForm === "remove" ? (
@@ -128,7 +128,7 @@ function Password(props: { of: string; set: (password: string) => void; close: (
   const [password, setPassword] = useState("");
   return (
     <form
-      class="account-form"
+      class="account-form row wrap gap-8"
       onSubmit={(event) => {
         event.preventDefault();
         props.set(password);
@@ -159,7 +159,7 @@ function AddAccount({ change }: { change: Change }) {
     );
   return (
     <form
-      class="account-form"
+      class="account-form row wrap gap-8"
       aria-label={s("add")}
       onSubmit={(event) => {
         event.preventDefault();

@@ -21,7 +21,7 @@ export function AttachedClients() {
       {lines.length === 0 ? (
         <p class="footnote">{s("nobody")}</p>
       ) : (
-        <ul class="presence-list">
+        <ul class="presence-list pad-0-16-12">
           {lines.map(({ token, site, robot, service, id }) => (
             <li key={token}>
               <span>{site}</span>

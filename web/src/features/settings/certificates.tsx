@@ -23,7 +23,7 @@ export function Certificates() {
   return (
     <Panel name="certificates" title={s("certificates")}>
       <p class="footnote dim">{s("certificates_words")}</p>
-      <ul class="presence-list">
+      <ul class="presence-list pad-0-16-12">
         {certificates
           .sort((a, b) => a.left - b.left)
           .map(({ key, site, seen, left }) => (

@@ -15,7 +15,7 @@ export function DelayChart({ hops }: { hops: readonly Hop[] }) {
       </figcaption>
       {ways.map(([key, way]) => (
         <div key={key} class="way">
-          <span class="way-key">{key.replace(/^robomesh\//, "")}</span>
+          <span class="break">{key.replace(/^robomesh\//, "")}</span>
           <ol>
             {way.map((hop, i) => (
               <li key={i}>

@@ -6,7 +6,7 @@ export type Fact = [name: string, value: ComponentChildren];
 
 export function Facts({ of: facts }: { of: readonly Fact[] }) {
   return (
-    <dl class="setting-facts">
+    <dl class="setting-facts pad-0-16-12">
       {facts.map(([name, value]) => (
         <div key={name}>
           <dt>{name}</dt>

@@ -65,13 +65,13 @@ function SiteTable({ site, latest }: { site: string; latest: Latest<MeshState> }
   const stale = isMeshStale(latest);
   return (
     <div class={`site-seen ${stale ? "stale" : ""}`}>
-      <div class="site-head">
+      <div class="site-head flex wrap baseline gap-16">
         <h3>{site}</h3>
         <span class="dim small">{s("seen_by", { site })}</span>
         {stale && <span class="age">{s("report_stale", { age: ageText(ageOf(latest) ?? 0) })}</span>}
       </div>
       <div class="table-place" tabIndex={0} role="region" aria-label={`${s("mesh")}, ${site}`}>
-        <table class="seen-table">
+        <table class="seen-table wide nowrap">
           <thead>
             <tr>
               {COLUMNS.map((name) => (

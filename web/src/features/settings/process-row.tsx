@@ -38,7 +38,7 @@ export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshS
         {seen.site !== props.of && <span class="dim">{seen.site}/</span>}
         {seen.service} {seen.robots.length > 0 && <span class="dim small seen-robots">{robotsText(seen.robots)}</span>}
         {values.length > 0 && (
-          <details class="seen-values">
+          <details class="seen-values small dim">
             <summary aria-label={s("values", { name: seen.service })}>
               {values.length === 1 ? s("value_one") : s("values_count", { count: values.length })}
             </summary>

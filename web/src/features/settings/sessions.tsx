@@ -47,7 +47,7 @@ export function Sessions() {
   return (
     <Panel name="sessions" title={s("sessions")}>
       <p class="footnote dim">{s("sessions_words")}</p>
-      <ul class="presence-list">
+      <ul class="presence-list pad-0-16-12">
         {sessions.map((session) => (
           <li key={session.id}>
             <strong>{session.account}</strong>

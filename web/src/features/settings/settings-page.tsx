@@ -15,7 +15,7 @@ import "./settings-page.css";
 
 export function SettingsPage() {
   return (
-    <div class="settings-page">
+    <div class="settings-page grid wide gap-8">
       <h1 class="unseen">{t("settings")}</h1>
       <ThisConsole hello={hello.value} />
       <Appearance />

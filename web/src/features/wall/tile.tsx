@@ -68,22 +68,22 @@ export function WallTile(props: {
   return (
     <article
       ref={place}
-      class={`wall-tile ${state.level} ${live.stale || ended || !watched ? "stale" : ""}`}
+      class={`wall-tile stack narrow short ${state.level} ${live.stale || ended || !watched ? "stale" : ""}`}
       tabIndex={0}
       aria-label={`${label}: ${stateText(state)}`}
       onDblClick={() => (location.hash = robotLink(shown.site, shown.robot))}
     >
-      <div ref={pictured} class="wall-picture">
+      <div ref={pictured} class="wall-picture grow short anchor">
         {live.picture}
         {word && <p class="picture-word dim">{word}</p>}
         {live.stale && !ended && (
-          <p class="wall-stale">
+          <p class="wall-stale row nowrap gap-8">
             <span class="shape warning" aria-hidden="true" />
             <Age stale age={live.age} />
           </p>
         )}
         {problem && (
-          <p class={`wall-problem ${state.level}`} title={problem}>
+          <p class={`wall-problem small warned pad-4-8 ${state.level}`} title={problem}>
             {problem}
           </p>
         )}
@@ -91,13 +91,13 @@ export function WallTile(props: {
           ×
         </button>
       </div>
-      <div class="wall-line">
+      <div class="wall-line row nowrap gap-8 pad-0-8">
         <a href={robotLink(shown.site, shown.robot)} title={`${shown.site}/${shown.robot}`}>
           {shown.robot}
         </a>
         <span class="dim">{view}</span>
         {live.step > 0 && (
-          <span class="reduced" title={t("reduced_hint")}>
+          <span class="clip small warned" title={t("reduced_hint")}>
             {t("reduced")}
           </span>
         )}

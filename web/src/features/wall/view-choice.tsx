@@ -22,8 +22,8 @@ export function ViewChoice(props: {
   const set = (one: ViewName, on: boolean) => show(on ? [...shown, one] : shown.filter((other) => !is(one)(other)));
   const every = [...new Set(robots.flatMap((robot) => robot.views))];
   return (
-    <div class="wall-choose panel">
-      <div class="wall-every">
+    <div class="wall-choose rigid scroll gap-8 pad-8-16 panel">
+      <div class="wall-every row wrap gap-4-8">
         <span class="dim">{w("every")}</span>
         {every.map((view) => (
           <Button
@@ -35,9 +35,9 @@ export function ViewChoice(props: {
           />
         ))}
       </div>
-      <div class="wall-robots">
+      <div class="wall-robots grid gap-8-24">
         {robots.map(({ site, robot, views }) => (
-          <div key={`${site}/${robot}`} class="wall-robot" role="group" aria-label={`${site}/${robot}`}>
+          <div key={`${site}/${robot}`} class="row wrap gap-4-8" role="group" aria-label={`${site}/${robot}`}>
             <span class="wall-robot-name">
               <span class="dim">{site}/</span>
               {robot}

@@ -71,11 +71,11 @@ export function WallPage({ chosen }: { chosen: readonly ViewName[] }) {
   };
   return (
     // biome-ignore lint/a11y/noStaticElementInteractions: it moves the focus between the tiles inside.
-    <div class={`wall ${full.on ? "is-full" : ""}`} onKeyDown={onKey}>
-      <div class="wall-head">
+    <div class={`wall stack grow short gap-8 pad-8 ${full.on ? "is-full" : ""}`} onKeyDown={onKey}>
+      <div class="wall-head row wrap gap-0-16 pad-0-8">
         <h1>{t("wall")}</h1>
         <span class="dim">{shown.length === 1 ? w("picture") : w("pictures", { count: shown.length })}</span>
-        <span class="wall-end">
+        <span class="flex push gap-8">
           <Button
             text={choosing ? w("done") : w("choose")}
             aria-expanded={choosing}
@@ -90,7 +90,11 @@ export function WallPage({ chosen }: { chosen: readonly ViewName[] }) {
       </div>
       {choosing && <ViewChoice robots={robots} shown={shown} show={show} />}
       {shown.length === 0 && <p class="empty">{w("no_robots")}</p>}
-      <div ref={grid} class="wall-grid" style={{ "--columns": columns, "--rows": Math.ceil(shown.length / columns) }}>
+      <div
+        ref={grid}
+        class="wall-grid grid grow short scroll gap-8"
+        style={{ "--columns": columns, "--rows": Math.ceil(shown.length / columns) }}
+      >
         {shown.map((one, i) => {
           const key = `robomesh/${one.site}/${one.robot}`;
           return (

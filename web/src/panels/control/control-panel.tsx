@@ -61,7 +61,7 @@ export function ControlPanel(props: {
   if (isOnlyWatched(state)) {
     return (
       <Panel name="control" title={t("control")}>
-        <p class="no-control">{why}</p>
+        <p class="no-control pad-8-16">{why}</p>
       </Panel>
     );
   }
@@ -75,7 +75,7 @@ export function ControlPanel(props: {
     >
       <WhoControls robotKey={robotKey} holder={holder} lease={props.lease} readOnly={state?.readOnly ?? false} />
       {isMonitor.value || (
-        <div class="command-row">
+        <div class="command-row flex gap-8 pad-0-16-8">
           <Button
             text={t("home")}
             data-moves

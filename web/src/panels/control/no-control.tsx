@@ -16,7 +16,8 @@ export function NoControl() {
   const [password, setPassword] = useState("");
   const [problem, setProblem] = useState("");
   const [busy, setBusy] = useState(false);
-  if (isMonitor.value) return <p class="no-control">{a("monitor_only", { account: me.value?.account ?? "" })}</p>;
+  if (isMonitor.value)
+    return <p class="no-control pad-8-16">{a("monitor_only", { account: me.value?.account ?? "" })}</p>;
   const send = async () => {
     if (busy) return;
     setProblem("");
@@ -31,7 +32,7 @@ export function NoControl() {
   };
   return (
     <form
-      class="no-control"
+      class="no-control pad-8-16"
       aria-label={a("unlock")}
       onSubmit={(event) => {
         event.preventDefault();

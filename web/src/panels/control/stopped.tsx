@@ -24,7 +24,7 @@ export function Stopped(props: {
   const what = stop ? t("reset", { id: String(stop.id) }) : t("reset_own");
   const needs = moving ? t("reset_moving") : t(stop ? "reset_needs" : "own_reset_needs");
   return (
-    <div class="stopped">
+    <div class="stopped row spread gap-16">
       {/* A long text scrolls. */}
       <div role="group" aria-label={t("state_stopped")} tabIndex={0}>
         <strong>

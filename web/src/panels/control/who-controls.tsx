@@ -41,7 +41,7 @@ export function Holder(props: { robotKey: string; holder: string | null; lease: 
   return (
     <>
       <span
-        class={`holder ${mine ? "mine" : holder === null ? "dim" : ""}`}
+        class={`holder row clip ${mine ? "mine" : holder === null ? "dim" : ""}`}
         role="status"
         aria-label={t("who_controls")}
       >
@@ -49,7 +49,7 @@ export function Holder(props: { robotKey: string; holder: string | null; lease: 
         {who}
       </span>
       {holder && (
-        <span class="since dim" title={stampFull(props.lease?.since)}>
+        <span class="since nowrap small dim" title={stampFull(props.lease?.since)}>
           {t("since", { time: stampWhen(props.lease?.since) })}
         </span>
       )}
@@ -75,8 +75,8 @@ export function WhoControls(props: {
   if (mayNotCommand() && !mine) return <NoControl />;
   return (
     <>
-      <div class="take-row">
-        <label class="operator">
+      <div class="take-row flex gap-8 pad-0-16-8">
+        <label class="operator grow narrow">
           <span class="dim">{t("operator")}</span>
           <TextInput
             name="operator"
@@ -229,7 +229,11 @@ function Requests({ mine, robotKey, lease }: { mine: boolean; robotKey: string; 
 
 function ControlRequest(props: { strong?: boolean; text: string; reason?: string; children?: ComponentChildren }) {
   return (
-    <div class={`wish ${props.strong ? "strong" : ""}`} role="group" aria-label={t("control_request")}>
+    <div
+      class={`wish row wrap small dim gap-8 ${props.strong ? "strong" : ""}`}
+      role="group"
+      aria-label={t("control_request")}
+    >
       <p>{props.reason ? t("with_reason", { text: props.text, reason: props.reason }) : props.text}</p>
       {props.children}
     </div>
