@@ -8,7 +8,6 @@ import pytest
 from robomesh.errors import BrokenAnswerError
 from robomesh.requests import chunked_replies
 from robomesh.wire.session import open_session
-from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 
 KEY = "robomesh/hall/arm/mesh/{}"
@@ -76,76 +75,58 @@ def intercept(monkeypatch, act):
     monkeypatch.setattr(chunked_replies.ChunkedReplies, "reply_chunk", reply_chunk)
 
 
-def test_lost_chunks_are_requested_again_and_the_handler_is_not(mesh, monkeypatch):
-    async def main():
-        async with owner_and_caller(mesh) as (asker, asked, *_):
-            intercept(monkeypatch, lambda answers, number: number % 3 == 0)
-            assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
-            assert asked == ["base"]
-
-    run(main())
+async def test_lost_chunks_are_requested_again_and_the_handler_is_not(mesh, monkeypatch):
+    async with owner_and_caller(mesh) as (asker, asked, *_):
+        intercept(monkeypatch, lambda answers, number: number % 3 == 0)
+        assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
+        assert asked == ["base"]
 
 
-def test_answer_dropped_during_the_transfer_is_requested_again(mesh, monkeypatch):
-    async def main():
-        async with owner_and_caller(mesh) as (asker, asked, *_):
-            intercept(monkeypatch, lambda answers, number: number == 3 and answers._kept.clear())
-            assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
-            assert asked == ["base", "base"]
-
-    run(main())
+async def test_answer_dropped_during_the_transfer_is_requested_again(mesh, monkeypatch):
+    async with owner_and_caller(mesh) as (asker, asked, *_):
+        intercept(monkeypatch, lambda answers, number: number == 3 and answers._kept.clear())
+        assert await asker.ask_bytes(KEY.format("base"), timeout_s=20.0) == mesh_of("base")
+        assert asked == ["base", "base"]
 
 
-def test_answer_that_ends_early_is_an_error(mesh, monkeypatch):
-    async def main():
-        async with owner_and_caller(mesh) as (asker, *_):
-            intercept(monkeypatch, lambda answers, number: number > 1)
-            with pytest.raises(BrokenAnswerError) as caught:
-                await asker.ask_bytes(KEY.format("base"), timeout_s=2.0)
-            reason = caught.value.reason
-            assert (reason.code, reason.causes[0].code) == ("request.broken_answer", "piece.none")
-            assert reason.values["bytes"] in ("30000", "60000")
-
-    run(main())
+async def test_answer_that_ends_early_is_an_error(mesh, monkeypatch):
+    async with owner_and_caller(mesh) as (asker, *_):
+        intercept(monkeypatch, lambda answers, number: number > 1)
+        with pytest.raises(BrokenAnswerError) as caught:
+            await asker.ask_bytes(KEY.format("base"), timeout_s=2.0)
+        reason = caught.value.reason
+        assert (reason.code, reason.causes[0].code) == ("request.broken_answer", "piece.none")
+        assert reason.values["bytes"] in ("30000", "60000")
 
 
-def test_fetched_answers_are_dropped_first_and_equal_ones_are_kept_once(mesh, monkeypatch):
-    async def main():
-        monkeypatch.setattr(chunked_replies, "_KEPT_BYTES", 2 * LENGTH)
-        async with owner_and_caller(mesh) as (asker, _, answers, _):
-            unfinished, fetched = await token_of(asker, "a"), await token_of(asker, "b")
-            for number in range(1, CHUNKS):
-                assert await chunk(asker, "b", fetched, number * chunked_replies.CHUNK_BYTES)
-            # Many requests for one mesh drop no other answer.
-            assert {await token_of(asker, "c") for _ in range(4)} == {await token_of(asker, "c")}
-            assert await chunk(asker, "a", unfinished, LENGTH - 7) == b"a" * 7
-            assert await chunk(asker, "b", fetched, LENGTH - 7) is None
-            assert len(answers._kept) == 2
-
-    run(main())
+async def test_fetched_answers_are_dropped_first_and_equal_ones_are_kept_once(mesh, monkeypatch):
+    monkeypatch.setattr(chunked_replies, "_KEPT_BYTES", 2 * LENGTH)
+    async with owner_and_caller(mesh) as (asker, _, answers, _):
+        unfinished, fetched = await token_of(asker, "a"), await token_of(asker, "b")
+        for number in range(1, CHUNKS):
+            assert await chunk(asker, "b", fetched, number * chunked_replies.CHUNK_BYTES)
+        # Many requests for one mesh drop no other answer.
+        assert {await token_of(asker, "c") for _ in range(4)} == {await token_of(asker, "c")}
+        assert await chunk(asker, "a", unfinished, LENGTH - 7) == b"a" * 7
+        assert await chunk(asker, "b", fetched, LENGTH - 7) is None
+        assert len(answers._kept) == 2
 
 
-def test_answer_in_a_callers_name_is_sent_a_few_times_only(mesh):
-    async def main():
-        async with owner_and_caller(mesh) as (asker, _, _, answers):
-            another, token = await token_of(asker, "li", NAMED), await token_of(asker, "li", NAMED)
-            assert another != token
-            for offset in (LENGTH, "9" * 5000, "-1", "x", ""):
-                assert await chunk(asker, "li", token, offset, NAMED) is None
-            sent = 0
-            while await chunk(asker, "li", token, 0, NAMED) is not None:
-                sent += 1
-            assert sent == chunked_replies._TIMES * (CHUNKS - 1)
-            assert list(answers._kept) == [another]
-
-    run(main())
+async def test_answer_in_a_callers_name_is_sent_a_few_times_only(mesh):
+    async with owner_and_caller(mesh) as (asker, _, _, answers):
+        another, token = await token_of(asker, "li", NAMED), await token_of(asker, "li", NAMED)
+        assert another != token
+        for offset in (LENGTH, "9" * 5000, "-1", "x", ""):
+            assert await chunk(asker, "li", token, offset, NAMED) is None
+        sent = 0
+        while await chunk(asker, "li", token, 0, NAMED) is not None:
+            sent += 1
+        assert sent == chunked_replies._TIMES * (CHUNKS - 1)
+        assert list(answers._kept) == [another]
 
 
-def test_an_idle_owner_keeps_nothing(mesh, monkeypatch):
-    async def main():
-        monkeypatch.setattr(chunked_replies, "_KEPT_S", 0.1)
-        async with owner_and_caller(mesh) as (asker, _, answers, _):
-            await token_of(asker, "a")
-            await until(lambda: not answers._kept)
-
-    run(main())
+async def test_an_idle_owner_keeps_nothing(mesh, monkeypatch):
+    monkeypatch.setattr(chunked_replies, "_KEPT_S", 0.1)
+    async with owner_and_caller(mesh) as (asker, _, answers, _):
+        await token_of(asker, "a")
+        await until(lambda: not answers._kept)

@@ -8,27 +8,23 @@ from pathlib import Path
 
 from robomesh.publications.subscription import Subscription
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 
-def test_subscription_closed_before_its_first_read_ends_without_error(mesh, monkeypatch):
+async def test_subscription_closed_before_its_first_read_ends_without_error(mesh, monkeypatch):
     read, begin = Subscription._read, threading.Event()
 
     def late(subscription):
         begin.wait(10.0)
         read(subscription)
 
-    async def main():
-        monkeypatch.setattr(Subscription, "_read", late)
-        async with open_session(mesh) as monitor:
-            subscription = monitor.subscribe("robomesh/site/arm/joints", history=False)
-            subscription.close()
-            begin.set()
-            # An error in the thread would fail this test.
-            await asyncio.to_thread(subscription._thread.join)
-            assert [sample async for sample in subscription] == []
-
-    run(main())
+    monkeypatch.setattr(Subscription, "_read", late)
+    async with open_session(mesh) as monitor:
+        subscription = monitor.subscribe("robomesh/site/arm/joints", history=False)
+        subscription.close()
+        begin.set()
+        # An error in the thread would fail this test.
+        await asyncio.to_thread(subscription._thread.join)
+        assert [sample async for sample in subscription] == []
 
 
 # On a busy machine a reading thread may wake up late.

@@ -113,24 +113,21 @@ def test_replay_with_old_source_times_is_never_late(mesh):
     assert late == 0.0
 
 
-def test_publisher_with_a_set_clock_takes_another_identity(mesh, monkeypatch):
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
-            publisher = gateway.declare_publisher("hall", "arm", "joints")
-            states = monitor.subscribe("robomesh/hall/arm/joints", history=False, newest=10)
-            while not publisher.watched:
-                await asyncio.sleep(0.01)
-            one = publisher.put(JointStates())
-            await anext(states)
-            real = time.time_ns
-            monkeypatch.setattr(time, "time_ns", lambda: real() - 5 * S)
-            other = publisher.put(JointStates())
-            assert (other.publisher != one.publisher, other.sequence) == (True, one.sequence + 1)
-            assert (await anext(states)).late_s < 1.0
-            # With another publisher's source times the identity changes only with that publisher.
-            by_one = [publisher.put(JointStates(), source_time_ns=7 * S, dated_by=1) for _ in range(2)]
-            by_two = publisher.put(JointStates(), source_time_ns=3 * S, dated_by=2)
-            assert by_one[0].publisher == by_one[1].publisher != by_two.publisher
-            assert states.lost("robomesh/hall/arm/joints") == 0
-
-    run(main())
+async def test_publisher_with_a_set_clock_takes_another_identity(mesh, monkeypatch):
+    async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+        publisher = gateway.declare_publisher("hall", "arm", "joints")
+        states = monitor.subscribe("robomesh/hall/arm/joints", history=False, newest=10)
+        while not publisher.watched:
+            await asyncio.sleep(0.01)
+        one = publisher.put(JointStates())
+        await anext(states)
+        real = time.time_ns
+        monkeypatch.setattr(time, "time_ns", lambda: real() - 5 * S)
+        other = publisher.put(JointStates())
+        assert (other.publisher != one.publisher, other.sequence) == (True, one.sequence + 1)
+        assert (await anext(states)).late_s < 1.0
+        # With another publisher's source times the identity changes only with that publisher.
+        by_one = [publisher.put(JointStates(), source_time_ns=7 * S, dated_by=1) for _ in range(2)]
+        by_two = publisher.put(JointStates(), source_time_ns=3 * S, dated_by=2)
+        assert by_one[0].publisher == by_one[1].publisher != by_two.publisher
+        assert states.lost("robomesh/hall/arm/joints") == 0

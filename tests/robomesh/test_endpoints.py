@@ -9,7 +9,7 @@ import zenoh
 
 from robomesh.contract.endpoints import client_config, router_config, router_values
 from robomesh.wire.session import SessionSettings, open_session
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 
 
 async def no_answer(request):
@@ -51,18 +51,14 @@ def buffer_sizes():
     return found
 
 
-def test_connection_for_commands_has_small_buffers(router):
+async def test_connection_for_commands_has_small_buffers(router):
     """Check that a slow service slows down a flooding sender, and not the requests of other callers."""
     port = int(router.rpartition(":")[2])
-
-    async def main():
-        async with open_session(SessionSettings(connect=(router,), wait_s=5.0)) as session:
-            before = buffer_sizes()
-            session.answer("hall", "arm", "command/*", no_answer)
-            new = {ports: sizes for ports, sizes in buffer_sizes().items() if ports not in before}
-            services = [sizes for (_, to), sizes in new.items() if to == port]
-            routers = [sizes for (of, _), sizes in new.items() if of == port]
-            assert len(services) == len(routers) == 2  # two links, and both ends of each are in this process
-            assert max(*services[0], *services[1], routers[0][0], routers[1][0]) <= 2 * 32_768
-
-    run(main())
+    async with open_session(SessionSettings(connect=(router,), wait_s=5.0)) as session:
+        before = buffer_sizes()
+        session.answer("hall", "arm", "command/*", no_answer)
+        new = {ports: sizes for ports, sizes in buffer_sizes().items() if ports not in before}
+        services = [sizes for (_, to), sizes in new.items() if to == port]
+        routers = [sizes for (of, _), sizes in new.items() if of == port]
+        assert len(services) == len(routers) == 2  # two links, and both ends of each are in this process
+        assert max(*services[0], *services[1], routers[0][0], routers[1][0]) <= 2 * 32_768

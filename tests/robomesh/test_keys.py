@@ -5,7 +5,6 @@ import pytest
 from robomesh.contract import keys
 from robomesh.errors import KeyNameError
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 
 @pytest.mark.parametrize(("robot", "expected"), [("replay-1", True), ("arm", False), ("my-replay-1", False)])
@@ -30,7 +29,7 @@ def test_invalid_chunk_of_a_parsed_key_is_an_error(key):
         keys.parse_key(str(keys.Key(*key)))
 
 
-def test_request_is_parsed_once_by_its_client_and_once_by_its_owner(mesh, monkeypatch):
+async def test_request_is_parsed_once_by_its_client_and_once_by_its_owner(mesh, monkeypatch):
     parse, parsed = keys.parse_expression, []
 
     def count(key):
@@ -41,17 +40,14 @@ def test_request_is_parsed_once_by_its_client_and_once_by_its_owner(mesh, monkey
     async def shape_of(request):
         return b"mesh"
 
-    async def main():
-        async with open_session(mesh) as owner, open_session(mesh) as client:
-            owner.answer("site", "arm", "mesh/*", shape_of)
-            key = "robomesh/site/arm/mesh/base"
-            await client.ask_bytes(key, timeout_s=20.0)
-            monkeypatch.setattr(keys, "parse_expression", count)
-            keys.parse_key.cache_clear()
-            await client.ask_bytes(key)
-            assert parsed == [key, key]
-            keys.parse_key.cache_clear()
-            await client.ask_bytes(keys.Key("site", "arm", "mesh/base"))
-            assert parsed == [key, key, key]
-
-    run(main())
+    async with open_session(mesh) as owner, open_session(mesh) as client:
+        owner.answer("site", "arm", "mesh/*", shape_of)
+        key = "robomesh/site/arm/mesh/base"
+        await client.ask_bytes(key, timeout_s=20.0)
+        monkeypatch.setattr(keys, "parse_expression", count)
+        keys.parse_key.cache_clear()
+        await client.ask_bytes(key)
+        assert parsed == [key, key]
+        keys.parse_key.cache_clear()
+        await client.ask_bytes(keys.Key("site", "arm", "mesh/base"))
+        assert parsed == [key, key, key]

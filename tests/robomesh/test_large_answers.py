@@ -3,22 +3,18 @@
 import pytest
 
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 
 @pytest.mark.parametrize("size", [40_956, 133_596, 187_244, 241_624, 3_000_000])
-def test_answer_of_any_size_arrives_with_one_request(mesh, size):
-    async def main():
-        async with open_session(mesh) as owner, open_session(mesh) as asker:
-            asked = []
+async def test_answer_of_any_size_arrives_with_one_request(mesh, size):
+    async with open_session(mesh) as owner, open_session(mesh) as asker:
+        asked = []
 
-            async def shape_of(request):
-                asked.append(request.chunk)
-                return b"\x5a" * size
+        async def shape_of(request):
+            asked.append(request.chunk)
+            return b"\x5a" * size
 
-            owner.answer("hall", "arm", "mesh/*", shape_of)
-            answer = await asker.ask_bytes("robomesh/hall/arm/mesh/base", timeout_s=8.0)
-            assert answer == b"\x5a" * size
-            assert asked == ["base"]
-
-    run(main())
+        owner.answer("hall", "arm", "mesh/*", shape_of)
+        answer = await asker.ask_bytes("robomesh/hall/arm/mesh/base", timeout_s=8.0)
+        assert answer == b"\x5a" * size
+        assert asked == ["base"]

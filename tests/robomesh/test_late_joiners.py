@@ -7,7 +7,7 @@ import zenoh
 
 from robomesh.publications.late_joiners import _MOST_WAITING, AnsweringThread
 from robomesh.wire.session import open_session
-from tests.conftest import last_value, run
+from tests.conftest import last_value
 from tests.robomesh.test_session import joints
 
 
@@ -68,22 +68,19 @@ def test_an_answer_after_close_is_dropped():
     assert ran == ["before"]
 
 
-def test_publishers_have_no_threads_of_their_own(mesh):
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
-            gateway.declare_publisher("site", "arm", "joints").put(joints(1.0))
-            assert await last_value(monitor, "robomesh/site/arm/joints") == joints(1.0)
-            before = threading.active_count()
-            for number in range(10):
-                publisher = gateway.declare_publisher("site", f"arm-{number}", "joints")
-                publisher.on_watched(lambda: None)
-                publisher.put(joints(number))
+async def test_publishers_have_no_threads_of_their_own(mesh):
+    async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+        gateway.declare_publisher("site", "arm", "joints").put(joints(1.0))
+        assert await last_value(monitor, "robomesh/site/arm/joints") == joints(1.0)
+        before = threading.active_count()
+        for number in range(10):
+            publisher = gateway.declare_publisher("site", f"arm-{number}", "joints")
+            publisher.on_watched(lambda: None)
+            publisher.put(joints(number))
 
-                async def image():
-                    return None
+            async def image():
+                return None
 
-                gateway.declare_publisher("site", f"arm-{number}", "image/front", on_get=image)
-            assert threading.active_count() <= before
-            assert await last_value(monitor, "robomesh/site/arm-7/joints") == joints(7.0)
-
-    run(main())
+            gateway.declare_publisher("site", f"arm-{number}", "image/front", on_get=image)
+        assert threading.active_count() <= before
+        assert await last_value(monitor, "robomesh/site/arm-7/joints") == joints(7.0)

@@ -13,7 +13,6 @@ from robomesh.errors import RefusedError
 from robomesh.requests.requests import ask_all
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 STOP = "robomesh/site/{}/stop"
 
@@ -25,7 +24,7 @@ def plain(mesh):
         yield session
 
 
-def test_invalid_answer_hides_no_other_answer(mesh, plain):
+async def test_invalid_answer_hides_no_other_answer(mesh, plain):
     async def stop(request):
         return schema.StopAnswer(stop_id=7, sent=True)
 
@@ -33,38 +32,32 @@ def test_invalid_answer_hides_no_other_answer(mesh, plain):
         with query:
             query.reply(STOP.format("odd"), b"\xff\xff\xff")
 
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as operator:
-            gateway.answer("site", "arm", "stop", stop)
-            odd = plain.declare_queryable(STOP.format("odd"), nonsense)
-            answers = {}
-            while len(answers) < 2:  # until the router knows both
-                found = await operator.ask_all(STOP.format("*"), schema.StopRequest())
-                answers = {each.key: each for each in found}
-            odd.undeclare()
-            assert answers[STOP.format("arm")].message.stop_id == 7
-            assert answers[STOP.format("odd")].message is None
-            assert "3 bytes are not a robomesh.StopAnswer" in answers[STOP.format("odd")].error
-
-    run(main())
+    async with open_session(mesh) as gateway, open_session(mesh) as operator:
+        gateway.answer("site", "arm", "stop", stop)
+        odd = plain.declare_queryable(STOP.format("odd"), nonsense)
+        answers = {}
+        while len(answers) < 2:  # until the router knows both
+            found = await operator.ask_all(STOP.format("*"), schema.StopRequest())
+            answers = {each.key: each for each in found}
+        odd.undeclare()
+        assert answers[STOP.format("arm")].message.stop_id == 7
+        assert answers[STOP.format("odd")].message is None
+        assert "3 bytes are not a robomesh.StopAnswer" in answers[STOP.format("odd")].error
 
 
-def test_refusal_with_invalid_utf_8_is_a_refusal(mesh, plain):
+async def test_refusal_with_invalid_utf_8_is_a_refusal(mesh, plain):
     def refuse(query):
         with query:
             query.reply_err(b"no\xff", encoding=TEXT)
 
-    async def main():
-        odd = plain.declare_queryable(STOP.format("odd"), refuse)
-        async with open_session(mesh) as operator:
-            with pytest.raises(RefusedError, match="no\ufffd"):
-                await operator.ask(STOP.format("odd"), schema.StopRequest(), timeout_s=20.0)
-        odd.undeclare()
-
-    run(main())
+    odd = plain.declare_queryable(STOP.format("odd"), refuse)
+    async with open_session(mesh) as operator:
+        with pytest.raises(RefusedError, match="no\ufffd"):
+            await operator.ask(STOP.format("odd"), schema.StopRequest(), timeout_s=20.0)
+    odd.undeclare()
 
 
-def test_request_that_arrives_during_close_is_not_handled(mesh, plain):
+async def test_request_that_arrives_during_close_is_not_handled(mesh, plain):
     done = []
 
     async def stop(request):
@@ -77,23 +70,20 @@ def test_request_that_arrives_during_close_is_not_handled(mesh, plain):
             assert time.monotonic() < deadline
             time.sleep(0.01)
 
-    async def main():
-        async with open_session(mesh) as gateway:
-            server = gateway.answer("site", "arm", "stop", stop)
-            while not await ask_all(plain, Key("site", "arm", "stop"), b"", timeout_s=20.0):
-                pass
-            done.clear()
-            plain.get(STOP.format("arm"), lambda reply: None)
-            wait_until_received(server)  # blocks the loop, so that the request waits for it
-            server.close()
-            for _ in range(10):
-                await asyncio.sleep(0)
-            assert not done
-
-    run(main())
+    async with open_session(mesh) as gateway:
+        server = gateway.answer("site", "arm", "stop", stop)
+        while not await ask_all(plain, Key("site", "arm", "stop"), b"", timeout_s=20.0):
+            pass
+        done.clear()
+        plain.get(STOP.format("arm"), lambda reply: None)
+        wait_until_received(server)  # blocks the loop, so that the request waits for it
+        server.close()
+        for _ in range(10):
+            await asyncio.sleep(0)
+        assert not done
 
 
-def test_request_longer_than_its_row_permits_is_not_decoded_but_a_stop_stops(mesh, plain):
+async def test_request_longer_than_its_row_permits_is_not_decoded_but_a_stop_stops(mesh, plain):
     """One message of JSON, as anybody may send, would else occupy the owner's event loop for seconds."""
     seen = []
 
@@ -109,17 +99,14 @@ def test_request_longer_than_its_row_permits_is_not_decoded_but_a_stop_stops(mes
         answer = reply.ok or reply.err
         return answer.payload.to_string()
 
-    async def main():
-        async with open_session(mesh) as gateway:
-            gateway.answer("site", "arm", "stop", stop)
-            gateway.answer("site", "arm", "command/*", move)
-            while not await ask_all(plain, Key("site", "arm", "stop"), b"", timeout_s=20.0):
-                pass
-            for longest, why in ((4 << 20, "at most 524288 are permitted"), (500_000, "at most 10000")):
-                payload = b'{"joint_positions":[' + b"0," * (longest // 2) + b"0]}"
-                key = "robomesh/site/arm/command/li"
-                assert why in await asyncio.to_thread(text, key, payload)
-            await asyncio.to_thread(text, STOP.format("arm"), b'{"by":"' + b"x" * 300_000 + b'"}')
-            assert seen[-1] == schema.StopRequest()
-
-    run(main())
+    async with open_session(mesh) as gateway:
+        gateway.answer("site", "arm", "stop", stop)
+        gateway.answer("site", "arm", "command/*", move)
+        while not await ask_all(plain, Key("site", "arm", "stop"), b"", timeout_s=20.0):
+            pass
+        for longest, why in ((4 << 20, "at most 524288 are permitted"), (500_000, "at most 10000")):
+            payload = b'{"joint_positions":[' + b"0," * (longest // 2) + b"0]}"
+            key = "robomesh/site/arm/command/li"
+            assert why in await asyncio.to_thread(text, key, payload)
+        await asyncio.to_thread(text, STOP.format("arm"), b'{"by":"' + b"x" * 300_000 + b'"}')
+        assert seen[-1] == schema.StopRequest()

@@ -11,7 +11,6 @@ from robomesh.contract.topics import stale_after_s
 from robomesh.errors import UnknownTopicError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 
 def test_time_is_that_of_the_description_for_the_arm_and_the_topics_otherwise():
@@ -28,18 +27,15 @@ def test_time_is_that_of_the_description_for_the_arm_and_the_topics_otherwise():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("own", "error"), [(60.0, TimeoutError), (None, StaleError)])
-def test_client_waits_for_a_slow_robot(mesh, own, error):
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as client:
-            description = gateway.declare_publisher("hall", "arm", "description")
-            description.put(schema.Description(stale_after_s=own))
-            joints = gateway.declare_publisher("hall", "arm", "joints")
-            stream = AsyncRobot(client, "hall", "arm").joints()
-            await stream.prepare()
-            joints.put(JointStates(joints=[{"name": "waist", "position": 1.0}]))
-            assert (await anext(stream))["waist"] == 1.0
-            with pytest.raises(error):
-                async with asyncio.timeout(3.0):
-                    await anext(stream)
-
-    run(main())
+async def test_client_waits_for_a_slow_robot(mesh, own, error):
+    async with open_session(mesh) as gateway, open_session(mesh) as client:
+        description = gateway.declare_publisher("hall", "arm", "description")
+        description.put(schema.Description(stale_after_s=own))
+        joints = gateway.declare_publisher("hall", "arm", "joints")
+        stream = AsyncRobot(client, "hall", "arm").joints()
+        await stream.prepare()
+        joints.put(JointStates(joints=[{"name": "waist", "position": 1.0}]))
+        assert (await anext(stream))["waist"] == 1.0
+        with pytest.raises(error):
+            async with asyncio.timeout(3.0):
+                await anext(stream)

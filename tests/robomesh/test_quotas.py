@@ -8,7 +8,6 @@ from robomesh.errors import QuotaError
 from robomesh.schemas.robomesh_pb2 import CheckAnswer, CheckRequest
 from robomesh.service.metrics import SessionMetrics
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 
 class Clock:
@@ -84,29 +83,26 @@ def test_flood_of_names_takes_no_memory(monkeypatch):
         quota.check("li", 1.0)  # the caller that used most is forgotten last
 
 
-def test_caller_over_its_quota_waits_or_gets_an_error_which_is_counted(mesh):
-    async def main():
-        quota = Quota("checks", a_minute=120)
+async def test_caller_over_its_quota_waits_or_gets_an_error_which_is_counted(mesh):
+    quota = Quota("checks", a_minute=120)
 
-        async def answer(request):
-            with quota.in_progress(request.asker):
-                return CheckAnswer(ok=True)
+    async def answer(request):
+        with quota.in_progress(request.asker):
+            return CheckAnswer(ok=True)
 
-        async with open_session(mesh) as owner, open_session(mesh) as asker:
-            owner.answer("s", "r", "kinematics/check/*", answer)
-            key = f"robomesh/s/r/kinematics/check/{asker.own_name}"
-            quota.count(asker.own_name, 120.0)
-            # Answered as soon as the quota allows it.
-            assert (await asker.ask(key, CheckRequest(), timeout_s=30.0)).ok
-            quota.count(asker.own_name, 120.0)
-            with pytest.raises(QuotaError, match="quota: checks_a_minute = 120 for each name") as caught:
-                await asker.ask(key, CheckRequest(), timeout_s=5.0)
-            assert caught.value.again_s > 5.0
-            assert (await asker.ask("robomesh/s/r/kinematics/check/another", CheckRequest())).ok
-            (metric,) = [
-                each for each in SessionMetrics(owner, {}).collect() if each.name == "robomesh_over_quota"
-            ]
-            counted = {each.labels["request"]: each.value for each in metric.samples}
-            assert counted["kinematics/check/*"] >= 1
-
-    run(main())
+    async with open_session(mesh) as owner, open_session(mesh) as asker:
+        owner.answer("s", "r", "kinematics/check/*", answer)
+        key = f"robomesh/s/r/kinematics/check/{asker.own_name}"
+        quota.count(asker.own_name, 120.0)
+        # Answered as soon as the quota allows it.
+        assert (await asker.ask(key, CheckRequest(), timeout_s=30.0)).ok
+        quota.count(asker.own_name, 120.0)
+        with pytest.raises(QuotaError, match="quota: checks_a_minute = 120 for each name") as caught:
+            await asker.ask(key, CheckRequest(), timeout_s=5.0)
+        assert caught.value.again_s > 5.0
+        assert (await asker.ask("robomesh/s/r/kinematics/check/another", CheckRequest())).ok
+        (metric,) = [
+            each for each in SessionMetrics(owner, {}).collect() if each.name == "robomesh_over_quota"
+        ]
+        counted = {each.labels["request"]: each.value for each in metric.samples}
+        assert counted["kinematics/check/*"] >= 1

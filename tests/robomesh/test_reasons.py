@@ -13,7 +13,6 @@ from robomesh.errors import BusyError, QuotaError, RefusedError
 from robomesh.reasons import MOST_PARAMETER_BYTES, Code, Reason, pairs_of, reason_of, to_parameters
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 TABLE = [each for each in vars(codes).values() if isinstance(each, Code)]
 
@@ -98,26 +97,22 @@ async def refusals(session, error):
     return refused.value
 
 
-def test_refusal_keeps_its_code_over_a_router(mesh):
+async def test_refusal_keeps_its_code_over_a_router(mesh):
     reason = codes.STOP_LATCHED(id=7, by="li " * 60, reason="%&=;" * 60)
-
-    async def main():
-        async with open_session(mesh) as session:
-            found = await refusals(session, RefusedError(reason, text=f"Not sent: {reason}."))
-            assert (type(found), str(found)) == (RefusedError, f"Not sent: {reason}.")
-            assert (found.reason.code, found.reason.values["id"]) == ("stop.latched", "7")
-            # The session still works: more than 255 bytes would have ended it.
-            found = await refusals(session, BusyError(codes.BUSY()))
-            assert (type(found), found.reason.code) == (BusyError, "request.busy")
-            over = codes.OVER_QUOTA(asker="li", quota="checks_a_minute", most=120, seconds=9.0)
-            found = await refusals(session, QuotaError(over, again_s=9.0))
-            assert (type(found), found.again_s, found.reason.code) == (QuotaError, 9.0, "quota.rate")
-            assert found.reason.values["quota"] == "checks_a_minute"
-
-    run(main())
+    async with open_session(mesh) as session:
+        found = await refusals(session, RefusedError(reason, text=f"Not sent: {reason}."))
+        assert (type(found), str(found)) == (RefusedError, f"Not sent: {reason}.")
+        assert (found.reason.code, found.reason.values["id"]) == ("stop.latched", "7")
+        # The session still works: more than 255 bytes would have ended it.
+        found = await refusals(session, BusyError(codes.BUSY()))
+        assert (type(found), found.reason.code) == (BusyError, "request.busy")
+        over = codes.OVER_QUOTA(asker="li", quota="checks_a_minute", most=120, seconds=9.0)
+        found = await refusals(session, QuotaError(over, again_s=9.0))
+        assert (type(found), found.again_s, found.reason.code) == (QuotaError, 9.0, "quota.rate")
+        assert found.reason.values["quota"] == "checks_a_minute"
 
 
-def test_older_client_gets_the_encodings_that_it_knows(mesh):
+async def test_older_client_gets_the_encodings_that_it_knows(mesh):
     """Check a client that does not request codes and compares the whole encoding."""
     errors = iter(
         [BusyError(codes.BUSY()), QuotaError(codes.BUSY(), again_s=0.25), RefusedError(codes.BUSY())]
@@ -133,34 +128,28 @@ def test_older_client_gets_the_encodings_that_it_knows(mesh):
             for reply in plain.get("robomesh/site/arm/stop", timeout=5.0)
         ]
 
-    async def main():
-        async with open_session(mesh) as session:
-            session.answer("site", "arm", "stop", refuse)
-            with zenoh.open(client_config(mesh.connect, mesh.tls)) as plain:
-                found = await asyncio.to_thread(asked, plain)
-            assert [encoding for encoding, _ in found] == [
-                f"{TEXT};busy",
-                f"{TEXT};quota=0.250",
-                f"{TEXT};code=request.busy",
-            ]
-            assert {text for _, text in found} == {str(codes.BUSY())}
-
-    run(main())
+    async with open_session(mesh) as session:
+        session.answer("site", "arm", "stop", refuse)
+        with zenoh.open(client_config(mesh.connect, mesh.tls)) as plain:
+            found = await asyncio.to_thread(asked, plain)
+        assert [encoding for encoding, _ in found] == [
+            f"{TEXT};busy",
+            f"{TEXT};quota=0.250",
+            f"{TEXT};code=request.busy",
+        ]
+        assert {text for _, text in found} == {str(codes.BUSY())}
 
 
 @pytest.mark.parametrize(
     ("encoding", "kind"), [("busy", BusyError), ("quota=0.250", QuotaError), ("quota=nan", RefusedError)]
 )
-def test_older_owners_encodings_are_understood(mesh, encoding, kind):
+async def test_older_owners_encodings_are_understood(mesh, encoding, kind):
     def refuse(query):
         with query:
             query.reply_err(b"no", encoding=f"{TEXT};{encoding}")
 
-    async def main():
-        async with open_session(mesh) as session:
-            with zenoh.open(client_config(mesh.connect, mesh.tls)) as plain:
-                plain.declare_queryable("robomesh/site/arm/stop", refuse)
-                with pytest.raises(kind, match=r"^no$"):
-                    await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=0.2)
-
-    run(main())
+    async with open_session(mesh) as session:
+        with zenoh.open(client_config(mesh.connect, mesh.tls)) as plain:
+            plain.declare_queryable("robomesh/site/arm/stop", refuse)
+            with pytest.raises(kind, match=r"^no$"):
+                await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=0.2)

@@ -14,7 +14,6 @@ from robomesh.requests.requests import ask_all
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 
 HOME = schema.CommandRequest(command=schema.CommandRequest.HOME)
@@ -90,21 +89,18 @@ def is_busy(task):
     return task.done() and isinstance(task.result()[0][2], BusyError)
 
 
-def test_flooding_caller_fills_only_its_own_share(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, li):
-            asked = [once(eve, "eve") for _ in range(500)]
-            await until(lambda: sum(map(is_busy, asked)) >= 480)
-            other = asyncio.create_task(li.ask("robomesh/site/arm/command/li", HOME, timeout_s=20.0))
-            await until(lambda: "li" in owner.begun)
-            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
-            owner.go_on.set()
-            assert (await other).accepted
-            await asyncio.gather(*asked)
-            assert sum(map(is_busy, asked)) + owner.begun.count("eve") == 500
-            assert owner.begun.count("eve") == 16
-
-    run(main())
+async def test_flooding_caller_fills_only_its_own_share(mesh):
+    async with site(mesh) as (owner, eve, li):
+        asked = [once(eve, "eve") for _ in range(500)]
+        await until(lambda: sum(map(is_busy, asked)) >= 480)
+        other = asyncio.create_task(li.ask("robomesh/site/arm/command/li", HOME, timeout_s=20.0))
+        await until(lambda: "li" in owner.begun)
+        assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
+        owner.go_on.set()
+        assert (await other).accepted
+        await asyncio.gather(*asked)
+        assert sum(map(is_busy, asked)) + owner.begun.count("eve") == 500
+        assert owner.begun.count("eve") == 16
 
 
 def stops(session, number):
@@ -114,112 +110,91 @@ def stops(session, number):
     return [session.zenoh_session.get(key, payload=payload, encoding=PROTOBUF) for _ in range(number)]
 
 
-def test_repeated_stops_are_answered_while_the_loop_is_blocked_and_counted(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, li):
-            owner.remembered = schema.StopAnswer(stop_id=7, sent=True)
-            asked = stops(eve, 500)
-            # The first one waits for the loop.
-            answers = [schema.StopAnswer.FromString(each.recv().ok.payload.to_bytes()) for each in asked[1:]]
-            assert answers == [owner.remembered] * 499
-            count, newest, answer = owner.stops.take_repeated()
-            assert (count, newest.by, answer.stop_id, owner.stopped) == (499, "eve", 7, 0)
-            assert owner.stops.take_repeated() is None
-            await until(lambda: owner.stopped == 1)
-            # The owner handles a stop that repeats nothing in flight: it decides whether it is a new one.
-            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).stop_id == 1
-            assert owner.stopped == 2
-
-    run(main())
+async def test_repeated_stops_are_answered_while_the_loop_is_blocked_and_counted(mesh):
+    async with site(mesh) as (owner, eve, li):
+        owner.remembered = schema.StopAnswer(stop_id=7, sent=True)
+        asked = stops(eve, 500)
+        # The first one waits for the loop.
+        answers = [schema.StopAnswer.FromString(each.recv().ok.payload.to_bytes()) for each in asked[1:]]
+        assert answers == [owner.remembered] * 499
+        count, newest, answer = owner.stops.take_repeated()
+        assert (count, newest.by, answer.stop_id, owner.stopped) == (499, "eve", 7, 0)
+        assert owner.stops.take_repeated() is None
+        await until(lambda: owner.stopped == 1)
+        # The owner handles a stop that repeats nothing in flight: it decides whether it is a new one.
+        assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).stop_id == 1
+        assert owner.stopped == 2
 
 
-def test_stops_that_wait_for_the_loop_are_limited(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, _):
-            asked = stops(eve, 600)
-            block_until(lambda: owner.stops.turned_away == 600 - 256)
-            await until(lambda: owner.stopped == 256)
-            assert (len(asked), owner.stops.take_repeated()) == (600, None)
-
-    run(main())
+async def test_stops_that_wait_for_the_loop_are_limited(mesh):
+    async with site(mesh) as (owner, eve, _):
+        asked = stops(eve, 600)
+        block_until(lambda: owner.stops.turned_away == 600 - 256)
+        await until(lambda: owner.stopped == 256)
+        assert (len(asked), owner.stops.take_repeated()) == (600, None)
 
 
-def test_flood_with_many_names_is_limited(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, li):
-            asked = [once(eve, f"eve-{number}") for number in range(600)]
-            await until(lambda: sum(map(is_busy, asked)) == 600 - 256)
-            assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
-            owner.go_on.set()
-            await asyncio.gather(*asked)
-            assert len(owner.begun) == 256
-
-    run(main())
+async def test_flood_with_many_names_is_limited(mesh):
+    async with site(mesh) as (owner, eve, li):
+        asked = [once(eve, f"eve-{number}") for number in range(600)]
+        await until(lambda: sum(map(is_busy, asked)) == 600 - 256)
+        assert (await li.ask("robomesh/site/arm/stop", schema.StopRequest())).sent
+        owner.go_on.set()
+        await asyncio.gather(*asked)
+        assert len(owner.begun) == 256
 
 
-def test_flood_with_one_name_has_one_share_over_all_views(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, li):
-            asked = [once(eve, "eve", f"video/view-{number}/keyframe") for number in range(40)]
-            await until(lambda: sum(map(is_busy, asked)) == 40 - 16)
-            other = once(li, "li", "video/view-1/keyframe")
-            await until(lambda: "li" in owner.begun)
-            owner.go_on.set()
-            await asyncio.gather(*asked, other)
-            assert len(owner.begun) == 17
-
-    run(main())
+async def test_flood_with_one_name_has_one_share_over_all_views(mesh):
+    async with site(mesh) as (owner, eve, li):
+        asked = [once(eve, "eve", f"video/view-{number}/keyframe") for number in range(40)]
+        await until(lambda: sum(map(is_busy, asked)) == 40 - 16)
+        other = once(li, "li", "video/view-1/keyframe")
+        await until(lambda: "li" in owner.begun)
+        owner.go_on.set()
+        await asyncio.gather(*asked, other)
+        assert len(owner.begun) == 17
 
 
-def test_request_to_a_busy_owner_is_repeated_and_handled_once(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, li):
-            asked = [once(eve, "li") for _ in range(16)]
-            await until(lambda: len(owner.begun) >= 16)
-            key = "robomesh/site/arm/command/li"
-            with pytest.raises(BusyError, match="too many requests are waiting"):
-                await li.ask(key, HOME, timeout_s=0.3)
-            patient = asyncio.create_task(li.ask(key, HOME, timeout_s=20.0))
-            await asyncio.sleep(0.2)
-            assert len(owner.begun) == 16
-            owner.go_on.set()
-            assert (await patient).accepted
-            await asyncio.gather(*asked)
-            assert len(owner.begun) == 17
-
-    run(main())
+async def test_request_to_a_busy_owner_is_repeated_and_handled_once(mesh):
+    async with site(mesh) as (owner, eve, li):
+        asked = [once(eve, "li") for _ in range(16)]
+        await until(lambda: len(owner.begun) >= 16)
+        key = "robomesh/site/arm/command/li"
+        with pytest.raises(BusyError, match="too many requests are waiting"):
+            await li.ask(key, HOME, timeout_s=0.3)
+        patient = asyncio.create_task(li.ask(key, HOME, timeout_s=20.0))
+        await asyncio.sleep(0.2)
+        assert len(owner.begun) == 16
+        owner.go_on.set()
+        assert (await patient).accepted
+        await asyncio.gather(*asked)
+        assert len(owner.begun) == 17
 
 
-def test_stop_begins_before_earlier_requests(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, li):
-            asked = flood_while_the_loop_is_blocked(owner, eve)
-            stop = li.zenoh_session.get("robomesh/site/arm/stop")
-            block_until(lambda: owner.stops.waiting)
-            await until(lambda: owner.begun_before_stop is not None)
-            assert owner.begun_before_stop <= 2
-            owner.go_on.set()
-            await until(lambda: len(owner.begun) == 256)
-            del asked, stop
-
-    run(main())
+async def test_stop_begins_before_earlier_requests(mesh):
+    async with site(mesh) as (owner, eve, li):
+        asked = flood_while_the_loop_is_blocked(owner, eve)
+        stop = li.zenoh_session.get("robomesh/site/arm/stop")
+        block_until(lambda: owner.stops.waiting)
+        await until(lambda: owner.begun_before_stop is not None)
+        assert owner.begun_before_stop <= 2
+        owner.go_on.set()
+        await until(lambda: len(owner.begun) == 256)
+        del asked, stop
 
 
-def test_flood_for_one_robot_does_not_delay_another_robot(mesh):
-    async def main():
-        async with site(mesh) as (owner, eve, li):
-            asked = flood_while_the_loop_is_blocked(owner, eve)
-            other = li.zenoh_session.get(
-                "robomesh/site/other/command/li", payload=HOME.SerializeToString(), encoding=PROTOBUF
-            )
-            block_until(lambda: owner.commands_of_other.waiting)
-            await until(lambda: owner.begun_before_other is not None)
-            assert owner.begun_before_other <= 3
-            owner.go_on.set()
-            await until(lambda: len(owner.begun) == 256)
-            del asked, other
-
-    run(main())
+async def test_flood_for_one_robot_does_not_delay_another_robot(mesh):
+    async with site(mesh) as (owner, eve, li):
+        asked = flood_while_the_loop_is_blocked(owner, eve)
+        other = li.zenoh_session.get(
+            "robomesh/site/other/command/li", payload=HOME.SerializeToString(), encoding=PROTOBUF
+        )
+        block_until(lambda: owner.commands_of_other.waiting)
+        await until(lambda: owner.begun_before_other is not None)
+        assert owner.begun_before_other <= 3
+        owner.go_on.set()
+        await until(lambda: len(owner.begun) == 256)
+        del asked, other
 
 
 def test_rate_limit_allows_a_burst_and_then_its_rate():
@@ -229,34 +204,31 @@ def test_rate_limit_allows_a_burst_and_then_its_rate():
     assert [limit.take(99.0) for _ in range(4)] == [True, True, True, False]
 
 
-def test_begin_now_runs_to_the_first_wait_and_continues_in_a_task():
-    async def main():
-        loop, seen, go_on = asyncio.get_running_loop(), [], asyncio.Event()
+async def test_begin_now_runs_to_the_first_wait_and_continues_in_a_task():
+    loop, seen, go_on = asyncio.get_running_loop(), [], asyncio.Event()
 
-        async def work():
-            try:
-                seen.append("begun")
-                await go_on.wait()
-                await asyncio.sleep(0)
-                seen.append("done")
-            except asyncio.CancelledError:
-                seen.append("cancelled")
-                raise
+    async def work():
+        try:
+            seen.append("begun")
+            await go_on.wait()
+            await asyncio.sleep(0)
+            seen.append("done")
+        except asyncio.CancelledError:
+            seen.append("cancelled")
+            raise
 
-        task = begin_now(loop, work())
-        assert seen == ["begun"]
-        go_on.set()
+    task = begin_now(loop, work())
+    assert seen == ["begun"]
+    go_on.set()
+    await task
+    assert begin_now(loop, asyncio.sleep(0)) is not None
+    go_on.clear()
+    task = begin_now(loop, work())
+    await asyncio.sleep(0)
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
         await task
-        assert begin_now(loop, asyncio.sleep(0)) is not None
-        go_on.clear()
-        task = begin_now(loop, work())
-        await asyncio.sleep(0)
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        assert seen == ["begun", "done", "begun", "cancelled"]
-
-    run(main())
+    assert seen == ["begun", "done", "begun", "cancelled"]
 
 
 def test_a_flood_in_the_background_waits_longer_at_its_sender():

@@ -10,7 +10,7 @@ from robomesh.contract.endpoints import Tls, router_config
 from robomesh.errors import SessionError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
-from tests.conftest import free_port, last_value, run
+from tests.conftest import free_port, last_value
 
 
 def certificates(authority: trustme.CA, folder: Path, name: str) -> Tls:
@@ -22,26 +22,22 @@ def certificates(authority: trustme.CA, folder: Path, name: str) -> Tls:
     return tls
 
 
-def test_router_accepts_only_certificates_of_its_authority(tmp_path):
+async def test_router_accepts_only_certificates_of_its_authority(tmp_path):
     authority = trustme.CA()
     endpoint = f"tls/127.0.0.1:{free_port()}"
     strangers = tmp_path / "strangers"
     strangers.mkdir()
-
-    async def main():
-        with zenoh.open(router_config((endpoint,), tls=certificates(authority, tmp_path, "router"))):
-            settings = SessionSettings(
-                connect=(endpoint,), tls=certificates(authority, tmp_path, "gateway"), wait_s=5.0
-            )
-            async with open_session(settings) as one, open_session(settings) as other:
-                publisher = one.declare_publisher("site", "arm", "description")
-                publisher.put(schema.Description(name="pt600"))
-                message = await last_value(other, "robomesh/site/arm/description")
-                assert message.name == "pt600"
-            stranger = certificates(trustme.CA(), strangers, "stranger")
-            for tls, why in ((None, "it needs one"), (stranger, "did not sign")):
-                with pytest.raises(SessionError, match=why):
-                    async with open_session(SessionSettings(connect=(endpoint,), tls=tls, wait_s=0.0)):
-                        pass
-
-    run(main())
+    with zenoh.open(router_config((endpoint,), tls=certificates(authority, tmp_path, "router"))):
+        settings = SessionSettings(
+            connect=(endpoint,), tls=certificates(authority, tmp_path, "gateway"), wait_s=5.0
+        )
+        async with open_session(settings) as one, open_session(settings) as other:
+            publisher = one.declare_publisher("site", "arm", "description")
+            publisher.put(schema.Description(name="pt600"))
+            message = await last_value(other, "robomesh/site/arm/description")
+            assert message.name == "pt600"
+        stranger = certificates(trustme.CA(), strangers, "stranger")
+        for tls, why in ((None, "it needs one"), (stranger, "did not sign")):
+            with pytest.raises(SessionError, match=why):
+                async with open_session(SessionSettings(connect=(endpoint,), tls=tls, wait_s=0.0)):
+                    pass
