@@ -57,11 +57,11 @@ _OTHERS_AFTER_S = 3.0
 
 # Returns the groups of programs that should run in addition, now. A new key starts its group's programs; a
 # removed key stops them.
-ExtraPrograms = Callable[[], Mapping[Hashable, Callable[[], Sequence["Program"]]]]
+ExtraPrograms = Callable[[], Mapping[Hashable, Callable[[], Sequence["SupervisedProgram"]]]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Program:
+class SupervisedProgram:
     """A process to keep running.
 
     Attributes:
@@ -95,7 +95,7 @@ class _Process(Protocol):
 
 @dataclass(frozen=True)
 class _Running:
-    program: Program
+    program: SupervisedProgram
     process: _Process
 
 
@@ -124,7 +124,7 @@ class CouldNotStartError(ServiceError):
     """A required service cannot run with its configuration; its log has the reason."""
 
 
-def fork(programs: Sequence[Program], main: Callable[[], None]) -> Forked:
+def fork(programs: Sequence[SupervisedProgram], main: Callable[[], None]) -> Forked:
     """Fork a process for each program; those that cannot be forked are missing.
 
     Call it before the first thread, Zenoh session and event loop of this process.
@@ -161,7 +161,7 @@ def fork(programs: Sequence[Program], main: Callable[[], None]) -> Forked:
 
 
 async def supervise(
-    programs: Sequence[Program],
+    programs: Sequence[SupervisedProgram],
     *,
     ready: Callable[[], Awaitable[None]],
     write: Callable[[str], None],
@@ -184,7 +184,7 @@ async def supervise(
     first = {} if forked is None else await _adopt(forked)
     running |= {each.name: _Running(each, first[each.name]) for each in programs if each.name in first}
 
-    def keep(program: Program) -> Coroutine[None, None, None]:
+    def keep(program: SupervisedProgram) -> Coroutine[None, None, None]:
         prefixed = _prefixed(write, f"{program.name:<{width}} | ")
         return _keep_running(program, running, prefixed, first.pop(program.name, None))
 
@@ -227,11 +227,11 @@ def _prefixed(write: Callable[[str], None], prefix: str) -> Callable[[str], None
 async def _run_extra(
     extra: ExtraPrograms,
     running: dict[str, _Running],
-    keep: Callable[[Program], Coroutine[None, None, None]],
+    keep: Callable[[SupervisedProgram], Coroutine[None, None, None]],
     write: Callable[[str], None],
 ) -> None:
     """Start the extra programs that are new, and stop those that were removed."""
-    groups: dict[Hashable, list[tuple[Program, asyncio.Task[None]]]] = {}
+    groups: dict[Hashable, list[tuple[SupervisedProgram, asyncio.Task[None]]]] = {}
     async with asyncio.TaskGroup() as tasks:
         while True:
             wanted = await asyncio.to_thread(extra)
@@ -259,7 +259,10 @@ async def _begin_others(forked: Forked, ready: asyncio.Task[None]) -> None:
 
 
 async def _keep_running(
-    program: Program, running: dict[str, _Running], write: Callable[[str], None], first: _Process | None
+    program: SupervisedProgram,
+    running: dict[str, _Running],
+    write: Callable[[str], None],
+    first: _Process | None,
 ) -> None:
     wait_s = _SHORTEST_WAIT_S
     was_healthy = False
@@ -306,7 +309,7 @@ async def _lines(stream: asyncio.StreamReader) -> AsyncIterator[str]:
         yield rest.decode(errors="replace").rstrip()
 
 
-async def _next(program: Program, running: dict[str, _Running]) -> _Process:
+async def _next(program: SupervisedProgram, running: dict[str, _Running]) -> _Process:
     """Activate the standby process, or start a new one; return it."""
     waiting = running.pop(_standby_name(program), None)
     if waiting is None or waiting.process.returncode is not None:
@@ -318,7 +321,7 @@ async def _next(program: Program, running: dict[str, _Running]) -> _Process:
 
 
 @contextlib.asynccontextmanager
-async def _standby_of(program: Program, running: dict[str, _Running]) -> AsyncIterator[None]:
+async def _standby_of(program: SupervisedProgram, running: dict[str, _Running]) -> AsyncIterator[None]:
     """Keep a standby process during the block, if the program has one."""
 
     async def keep() -> None:
@@ -339,11 +342,11 @@ async def _standby_of(program: Program, running: dict[str, _Running]) -> AsyncIt
             await asyncio.gather(task, return_exceptions=True)
 
 
-def _standby_name(program: Program) -> str:
+def _standby_name(program: SupervisedProgram) -> str:
     return f"{program.name}, standby"
 
 
-async def _start(program: Program, *, standby: bool = False) -> asyncio.subprocess.Process:
+async def _start(program: SupervisedProgram, *, standby: bool = False) -> asyncio.subprocess.Process:
     supervisor = os.getpid()
     return await asyncio.create_subprocess_exec(
         *_words(program),
@@ -357,7 +360,7 @@ async def _start(program: Program, *, standby: bool = False) -> asyncio.subproce
     )
 
 
-def _words(program: Program) -> tuple[str, ...]:
+def _words(program: SupervisedProgram) -> tuple[str, ...]:
     # -P: a file of the current folder must not hide a module.
     return (sys.executable, "-P", "-m", "services.command_line.main", *program.arguments)
 
@@ -376,7 +379,7 @@ def _die_with(supervisor: int) -> None:
 
 
 def _be(
-    program: Program,
+    program: SupervisedProgram,
     main: Callable[[], None],
     supervisor: int,
     output: int,

@@ -55,7 +55,7 @@ from services.console.serving.uvicorn_server import (
     server_of,
     tls_context,
 )
-from services.console.websocket.page_connection import Browser
+from services.console.websocket.page_connection import PageConnection
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from services.console.websocket.websocket_transport import transport_of
 from services.site_file.tables.console import Console
@@ -125,7 +125,7 @@ def reach_warning(settings: Settings, host: str) -> str | None:
 
 
 class Hub:
-    """State that all browsers share: subscriptions, presence, meshes, accounts."""
+    """State that all pages share: subscriptions, presence, meshes, accounts."""
 
     def __init__(
         self, session: Session, settings: Settings, *, exposed: bool, tls: ssl.SSLContext | None = None
@@ -140,14 +140,14 @@ class Hub:
         self._alive: set[PresenceKey] = set()
         # After a start or a lost link, tokens arrive one by one.
         self._presence_known = False
-        self._browsers: set[Browser] = set()
-        self._closed_browsers = Counter[str]()  # samples of closed browsers
+        self._connections: set[PageConnection] = set()
+        self._closed_connections = Counter[str]()  # samples of closed connections
         self.exposed = exposed
         self._tls = tls
         self.auth = None if settings.accounts is None else self._open_auth(settings.accounts)
         self._tasks: list[asyncio.Task[None]] = []
         self.define = None if settings.define is None else Define(settings.define)
-        session.measure("browsers", "Pages that are open", lambda: len(self._browsers))
+        session.measure("browsers", "Pages that are open", lambda: len(self._connections))
         for name, text in (("offered", "that came for pages"), ("sent", "that were sent to pages")):
             session.measure(
                 f"page_samples_{name}_total", f"Samples {text}", functools.partial(self._count, name)
@@ -179,8 +179,8 @@ class Hub:
             await self.define.close()
         await self.recorded_video.close()
 
-    async def browse(self, websocket: WebSocket) -> None:
-        """Serve one browser's WebSocket; a browser sends its stops over one of their own."""
+    async def connect_page(self, websocket: WebSocket) -> None:
+        """Serve one page's WebSocket; a page sends its stops over one of their own."""
         stops_only = websocket.scope["path"].endswith("/stop")
         user: SignedIn | None = websocket.scope.get("signed_in")
         if user is not None and len(user.pages) >= MOST_PAGES and not stops_only:
@@ -190,7 +190,7 @@ class Hub:
         asker = client_address(websocket.scope) if user is None else user.account.name
         await transport_of(websocket).limit(asker, stops=stops_only)
         await websocket.accept()
-        browser = Browser(
+        connection = PageConnection(
             self.session,
             self.subscriptions,
             self.views,
@@ -202,22 +202,22 @@ class Hub:
         )
         if not stops_only:
             for each in self._alive:
-                browser.send_message(_presence(each, alive=True))
-            self._browsers.add(browser)
+                connection.send_message(_presence(each, alive=True))
+            self._connections.add(connection)
             if self._presence_known:
-                browser.greet()  # again, now that it has all presence
+                connection.greet()  # again, now that it has all presence
         try:
             if user is None:
-                await browser.run(websocket)
+                await connection.run(websocket)
             else:
-                await _serve_signed_in(browser, user, websocket)
+                await _serve_signed_in(connection, user, websocket)
         finally:
-            self._browsers.discard(browser)
-            self._closed_browsers.update(offered=browser.offered, sent=browser.sent)
+            self._connections.discard(connection)
+            self._closed_connections.update(offered=connection.offered, sent=connection.sent)
 
     def _count(self, name: str) -> int:
-        now: int = sum(getattr(browser, name) for browser in tuple(self._browsers))
-        return self._closed_browsers[name] + now
+        now: int = sum(getattr(connection, name) for connection in tuple(self._connections))
+        return self._closed_connections[name] + now
 
     def _open_auth(self, accounts: Path) -> AuthService:
         events = self.session.declare_publisher(self.settings.site, keys.WHOLE_SITE, "events/console")
@@ -243,19 +243,19 @@ class Hub:
             return operator_name(user.account.name, self.settings.site)
         return "" if self.session.principal is None else self.session.principal.name
 
-    def _hello(self, browser: Browser) -> ToPage:
+    def _hello(self, connection: PageConnection) -> ToPage:
         hello = ToPage.Hello(
             version=own_version(),
             site=self.settings.site,
             insecure=self.exposed,
             connected=self.session.connected,
-            session=browser.operator.id,
-            may_command=browser.user is None or browser.user.may_command,
-            operator=browser.own_name,
-            presence_known=self._presence_known and browser in self._browsers,
+            session=connection.operator.id,
+            may_command=connection.user is None or connection.user.may_command,
+            operator=connection.own_name,
+            presence_known=self._presence_known and connection in self._connections,
         )
-        if browser.user is not None:
-            hello.account = browser.user.account.name
+        if connection.user is not None:
+            hello.account = connection.user.account.name
         for name, row in topics.TOPICS.items():
             if row.stale_after_s is not None:
                 hello.stale.add(topic=name, after_s=row.stale_after_s)
@@ -266,8 +266,8 @@ class Hub:
     async def _watch_presence(self) -> None:
         async for token, alive in self.session.watch_presence():
             (self._alive.add if alive else self._alive.discard)(token)
-            for browser in self._browsers:
-                browser.send_message(_presence(token, alive=alive))
+            for connection in self._connections:
+                connection.send_message(_presence(token, alive=alive))
 
     async def _watch_presence_known(self) -> None:
         while True:
@@ -278,8 +278,8 @@ class Hub:
                 with contextlib.suppress(NoAnswerError):
                     self._presence_known = self._alive.issuperset(await self.session.present())
                 if self._presence_known:
-                    for browser in self._browsers:
-                        browser.greet()
+                    for connection in self._connections:
+                        connection.greet()
 
     async def _watch_router(self) -> None:
         connected = self.session.connected
@@ -287,15 +287,18 @@ class Hub:
             await asyncio.sleep(_CONNECTION_CHECK_EVERY_S)
             if self.session.connected is not connected:
                 connected = not connected
-                for browser in self._browsers:
-                    browser.greet()
+                for connection in self._connections:
+                    connection.greet()
 
 
-async def _serve_signed_in(browser: Browser, user: SignedIn, websocket: WebSocket) -> None:
+async def _serve_signed_in(connection: PageConnection, user: SignedIn, websocket: WebSocket) -> None:
     """Serve a page as long as its session lasts; close it with the reason when the session ends."""
     try:
-        with user.serving(), contextlib.nullcontext() if browser.stops_only else user.with_page(browser):
-            await browser.run(websocket)
+        with (
+            user.serving(),
+            contextlib.nullcontext() if connection.stops_only else user.with_page(connection),
+        ):
+            await connection.run(websocket)
     except asyncio.CancelledError:
         if not user.ended:
             raise
@@ -325,8 +328,8 @@ def application(hub: Hub) -> ASGIApp:
     routes: list[BaseRoute] = [
         Route("/health", health, methods=["GET"]),
         *account.routes(),
-        WebSocketRoute("/mesh", hub.browse),
-        WebSocketRoute("/mesh/stop", hub.browse),
+        WebSocketRoute("/mesh", hub.connect_page),
+        WebSocketRoute("/mesh/stop", hub.connect_page),
         Route("/mesh/{site}/{robot}/{name}", mesh, methods=["GET"]),
         Route("/layout/{site}/{robot}.json", layout, methods=["GET"]),
         *viewing,

@@ -33,7 +33,7 @@ _NEWEST = 512
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Shown:
+class ShownContent:
     """One content of a cell, ready to be shown.
 
     Attributes:
@@ -57,7 +57,7 @@ class Shown:
         return {each.fixture.name: each.fixture.fixture_to_site for each in self.fixtures}
 
 
-def first_content(description: CellDescription, contents: CellContents | None) -> Shown:
+def first_content(description: CellDescription, contents: CellContents | None) -> ShownContent:
     """Return the content of a cell at the start, without hulls.
 
     Raises:
@@ -66,7 +66,7 @@ def first_content(description: CellDescription, contents: CellContents | None) -
     version, robot = "", description.robots[0].name
     if contents is not None:
         version, _ = contents.describe(robot, contents.content(robot))
-    return Shown(version=version, description=description, fixtures=fixture_shapes(description))
+    return ShownContent(version=version, description=description, fixtures=fixture_shapes(description))
 
 
 class ShownCell:
@@ -76,13 +76,13 @@ class ShownCell:
         now: What is shown.
     """
 
-    def __init__(self, first: Shown, contents: CellContents | None, workers: Workers) -> None:
+    def __init__(self, first: ShownContent, contents: CellContents | None, workers: Workers) -> None:
         self.now = first
         self._contents, self._workers = contents, workers
         self._robot = first.description.robots[0].name
         self._describe: dict[str, Callable[[], None]] = {}
         self._publishers: dict[str, Publisher] = {}
-        self._prepared: Shown | None = None
+        self._prepared: ShownContent | None = None
         self._problem: Reason | None = None
         self._one_at_a_time = asyncio.Lock()
 
@@ -135,7 +135,7 @@ class ShownCell:
         self._publish()
         gc.freeze()
 
-    async def _prepare(self, version: str, content: schema.CellContent) -> Shown:
+    async def _prepare(self, version: str, content: schema.CellContent) -> ShownContent:
         """Return a content that is ready to be shown.
 
         Raises:
@@ -152,10 +152,10 @@ class ShownCell:
                 raise RefusedError(codes.INVALID(reason_of(error))) from None
             return self._prepared
 
-    def _made(self, version: str, content: schema.CellContent) -> Shown:
+    def _made(self, version: str, content: schema.CellContent) -> ShownContent:
         assert self._contents is not None
         _, description = self._contents.describe(self._robot, content)
-        return Shown(
+        return ShownContent(
             version=version,
             description=description,
             fixtures=fixture_shapes(description),

@@ -19,7 +19,7 @@ from robomesh.recordings.names import SUFFIX
 from robomesh.recordings.writing.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.disk import Disk, ended_by
-from services.recorder.file_writer import STATES, OnPublication, Part
+from services.recorder.file_writer import STATES, CaptureSink, OnPublication
 from services.recorder.finishing import Finisher, Job
 from services.recorder.settings import MIB, Settings
 from services.recorder.subscriptions import Subscriptions
@@ -41,7 +41,7 @@ def check_name(name: str) -> str:
     return name
 
 
-class Files:
+class CaptureFiles:
     """Opens, fills and closes the files of a robot.
 
     Args:
@@ -54,7 +54,7 @@ class Files:
         robot: str,
         subscriptions: Subscriptions,
         disk: Disk,
-        on_open: Callable[[Part], None],
+        on_open: Callable[[CaptureSink], None],
     ) -> None:
         self.settings, self.robot, self.disk = settings, robot, disk
         self.subscriptions = subscriptions
@@ -67,8 +67,8 @@ class Files:
         names: frozenset[str],
         *,
         on_publication: OnPublication | None = None,
-        replaces: Part | None = None,
-    ) -> Part:
+        replaces: CaptureSink | None = None,
+    ) -> CaptureSink:
         """Open a file for these topics; it continues `replaces` without a gap or an overlap.
 
         Raises:
@@ -79,7 +79,7 @@ class Files:
         begun_ns = time.monotonic_ns()
         start_ns = WallClock().latest_ns(begun_ns)
         capture = await asyncio.to_thread(Capture, path, metadata, start_ns=start_ns)
-        part = Part(capture, self.disk, on_publication, begun_ns=begun_ns)
+        part = CaptureSink(capture, self.disk, on_publication, begun_ns=begun_ns)
         if self.settings.site_file:
             data = self.settings.site_file.encode()
             capture.attach("site.toml", "application/toml", data, time_ns=capture.start_ns)
@@ -88,7 +88,7 @@ class Files:
         self._on_open(part)
         return part
 
-    async def close(self, part: Part) -> None:
+    async def close(self, part: CaptureSink) -> None:
         """Close a file after writing everything that arrived before.
 
         Raises:
@@ -96,20 +96,20 @@ class Files:
         """
         await asyncio.to_thread(self._close, part)
 
-    def detach(self, part: Part) -> None:
+    def detach(self, part: CaptureSink) -> None:
         """Stop adding publications to a file."""
         with self.subscriptions.lock:
             topics = self.subscriptions.robot(self.robot)
             self.count(part)
             topics.detach(part)
 
-    def count(self, part: Part) -> None:
+    def count(self, part: CaptureSink) -> None:
         """Update a file's count of lost publications."""
         with self.subscriptions.lock:
             if (lost := self.subscriptions.robot(self.robot).lost(part)) is not None:
                 part.lost = lost
 
-    def _attach(self, part: Part, names: frozenset[str], replaces: Part | None) -> None:
+    def _attach(self, part: CaptureSink, names: frozenset[str], replaces: CaptureSink | None) -> None:
         with self.subscriptions.lock:
             topics = self.subscriptions.robot(self.robot)
             if replaces is not None:
@@ -119,7 +119,7 @@ class Files:
             if replaces is not None:
                 topics.detach(replaces)
 
-    def _close(self, part: Part) -> None:
+    def _close(self, part: CaptureSink) -> None:
         with self.subscriptions.lock:
             self.subscriptions.robot(self.robot).drain()
             self.detach(part)
@@ -129,13 +129,13 @@ class Files:
 class RobotRecorder:
     """Capture of a robot, on request or while its controller traces."""
 
-    def __init__(self, files: Files, finisher: Finisher) -> None:
+    def __init__(self, files: CaptureFiles, finisher: Finisher) -> None:
         self._files, self._finisher = files, finisher
         self._settings, self._robot = files.settings, files.robot
         self._folder = files.settings.folder / files.robot
         self._lock = asyncio.Lock()
         self._names = STATES
-        self.part: Part | None = None
+        self.part: CaptureSink | None = None
         # Describes the open capture, or the last one.
         self.last = schema.Recording(site=self._settings.site, robot=self._robot)
 
@@ -207,7 +207,7 @@ class RobotRecorder:
             self.part = following
             await self._end(part, about={"part": str(number)})
 
-    def failed(self, capture: Capture, error: OSError) -> Part | None:
+    def failed(self, capture: Capture, error: OSError) -> CaptureSink | None:
         """End the capture after a disk error; return its part, or None if the file is not this capture's."""
         part = self.part
         if part is None or part.capture is not capture:
@@ -230,7 +230,7 @@ class RobotRecorder:
             self.last.ClearField("indexing")
         return self.last
 
-    async def _end(self, part: Part, *, about: dict[str, str]) -> Reason | None:
+    async def _end(self, part: CaptureSink, *, about: dict[str, str]) -> Reason | None:
         """Close a file and queue it for indexing; return the problem, if any."""
         try:
             await self._files.close(part)

@@ -65,7 +65,7 @@ class _Changed(NamedTuple):
     values: dict[str, str]
 
 
-class Changes:
+class RecordingChanges:
     """Changes of the recordings in a folder.
 
     Args:

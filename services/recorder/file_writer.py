@@ -16,7 +16,7 @@ OnPublication = Callable[[Topic, bytes], None]
 STATES = frozenset(row.name for row in TOPICS.values() if row.recorded and not row.name.startswith("video/"))
 
 
-class Part:
+class CaptureSink:
     """A capture as a sink of the robot's subscriptions.
 
     Args:

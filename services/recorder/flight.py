@@ -21,13 +21,13 @@ from robomesh.recordings.names import SUFFIX
 from robomesh.recordings.writing.capture import Capture, is_being_written
 from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
-from services.recorder.captures import Files, check_name
+from services.recorder.captures import CaptureFiles, check_name
 from services.recorder.disk import error_text
-from services.recorder.file_writer import STATES, Part
+from services.recorder.file_writer import STATES, CaptureSink
 from services.recorder.finishing import Finisher, Job
 from services.recorder.reading.robot_series import FLIGHT_FOLDER
 from services.recorder.settings import MIB
-from services.recorder.settings import FlightRecorder as Settings
+from services.recorder.settings import Flight as Settings
 
 log = logging.getLogger(__name__)
 
@@ -79,11 +79,11 @@ class FlightRecorder:
 
     def __init__(
         self,
-        files: Files,
+        files: CaptureFiles,
         finisher: Finisher,
         settings: Settings,
         *,
-        on_save: Callable[[Part], None],
+        on_save: Callable[[CaptureSink], None],
         report: Callable[[schema.Event.Severity, str, str], None],
     ) -> None:
         self._files, self._finisher, self._settings = files, finisher, settings
@@ -102,7 +102,7 @@ class FlightRecorder:
         self._on_save, self._report = on_save, report
         # Monotonic time at which each segment was first seen closed; a file's own time is a settable clock's.
         self._closed_at: dict[Path, float] = {}
-        self.part: Part | None = None
+        self.part: CaptureSink | None = None
         # Target of the save that is recording.
         self.saving: Path | None = None
         # The disk refuses new segments.
@@ -161,7 +161,7 @@ class FlightRecorder:
                 await self._next()
                 await asyncio.to_thread(self._remove_old)
 
-    def failed(self, capture: Capture) -> Part | None:
+    def failed(self, capture: Capture) -> CaptureSink | None:
         """Drop the open segment after a disk error; return it, or None if the file is not this recorder's."""
         part = self.part
         if part is None or part.capture is not capture:
@@ -219,7 +219,7 @@ class FlightRecorder:
             with suppress(OSError):
                 await self._files.close(before)
 
-    def _is_full(self, part: Part) -> bool:
+    def _is_full(self, part: CaptureSink) -> bool:
         most = self._files.settings.split.mib * MIB / _SEGMENTS
         longest_s = max(self._settings.minutes * 60 / _SEGMENTS, _MIN_SEGMENT_S)
         return part.age_s >= longest_s or part.capture.size >= most or part.clock_was_set()

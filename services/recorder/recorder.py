@@ -22,16 +22,16 @@ from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
 from services.recorder.attachments import DescriptionCache, picture, self_contained_urdf
-from services.recorder.captures import Files, RobotRecorder
-from services.recorder.changes import Changes
+from services.recorder.captures import CaptureFiles, RobotRecorder
+from services.recorder.changes import RecordingChanges
 from services.recorder.disk import Disk, error_text
 from services.recorder.events import EventReporter, report_disk
-from services.recorder.file_writer import Part
+from services.recorder.file_writer import CaptureSink
 from services.recorder.finishing import Finisher, Job
 from services.recorder.flight import FlightRecorder
 from services.recorder.orphans import left_state, lock_folder
 from services.recorder.reading.serving import RecordingServer
-from services.recorder.reading.uses import Uses
+from services.recorder.reading.uses import RecordingUses
 from services.recorder.settings import Settings
 from services.recorder.subscriptions import Subscriptions
 
@@ -62,7 +62,7 @@ class _Robot:
 
     def __init__(self, recorder: "_Recorder", name: str) -> None:
         session, settings = recorder.session, recorder.settings
-        files = Files(settings, name, recorder.subscriptions, recorder.disk, self._on_open)
+        files = CaptureFiles(settings, name, recorder.subscriptions, recorder.disk, self._on_open)
         self.name = name
         self.recorder = recorder
         self.captures = RobotRecorder(files, recorder.finisher)
@@ -159,16 +159,16 @@ class _Robot:
             if view not in (*names, "-") and not view.startswith("free-"):
                 raise RefusedError(codes.VIEW_UNKNOWN_OF(view=view, robot=self.name, views=", ".join(names)))
 
-    def _on_open(self, part: Part) -> None:
+    def _on_open(self, part: CaptureSink) -> None:
         # A segment of the flight recorder gets its attachments when it is saved.
         if part.capture.about["started_by"] != "flight":
             self._add_description(part)
 
-    def _add_description(self, part: Part) -> None:
+    def _add_description(self, part: CaptureSink) -> None:
         self._attach(part)
         self.recorder.start(self._picture(part))
 
-    def _attach(self, part: Part) -> None:
+    def _attach(self, part: CaptureSink) -> None:
         known = self.recorder.descriptions.known.get(self.name)
         if known is None:
             return
@@ -182,7 +182,7 @@ class _Robot:
                 part.capture.add_text(ROBOT_DESCRIPTION, text, known.header, received_ns=log_time_ns)
                 part.capture.hand_over()
 
-    async def _picture(self, part: Part) -> None:
+    async def _picture(self, part: CaptureSink) -> None:
         settings = self.recorder.settings
         if (found := await picture(self.recorder.session, settings.site, self.name)) is not None:
             part.capture.attach(found.name, found.media_type, found.data, time_ns=time.time_ns())
@@ -201,7 +201,7 @@ class _Recorder:
         self.finisher = Finisher()
         self.events = EventReporter(session, settings.site)
         self.descriptions = DescriptionCache(session, settings.site, self._on_known)
-        self._uses = Uses()
+        self._uses = RecordingUses()
         self._serving = RecordingServer(
             session,
             settings.site,
@@ -211,7 +211,7 @@ class _Recorder:
             quotas=settings.quotas,
             uses=self._uses,
         )
-        self._changes = Changes(
+        self._changes = RecordingChanges(
             settings.folder,
             describe=self._serving.describe,
             is_used=self._use_of,

@@ -12,7 +12,7 @@ from robomesh.schemas.robomesh_pb2 import Event
 MIB = 1 << 20
 
 
-class FlightRecorder(BaseModel):
+class Flight(BaseModel):
     """The last minutes of every robot, saved after an event.
 
     Attributes:
@@ -76,7 +76,7 @@ class Recorder(BaseModel):
     model_config = PART_CONFIG
     folder: Path = Path("recordings")
     views: tuple[str, ...] | None = None
-    flight: FlightRecorder = FlightRecorder()
+    flight: Flight = Flight()
     split: Split = Split()
     free: FreeSpace = FreeSpace()
 

@@ -43,7 +43,7 @@ class _Robot:
     texts: dict[str, int] = field(default_factory=dict)
 
 
-class Changed(NamedTuple):
+class ProgramChange(NamedTuple):
     """The answer to a request, and the program's name before; None: nothing has changed."""
 
     answer: ProgramAnswer
@@ -112,7 +112,7 @@ class ProgramStore:
         programs = sorted_by_name(self._robots[robot].programs.values())
         return ProgramList(programs=[each.message for each in programs])
 
-    def change(self, asked: ProgramRequest, author: str, at_ns: int) -> Changed:
+    def change(self, asked: ProgramRequest, author: str, at_ns: int) -> ProgramChange:
         """Save, rename, delete or restore a program.
 
         Raises:
@@ -127,7 +127,7 @@ class ProgramStore:
                 raise RefusedError(codes.PROGRAMS_TOO_MANY(robot=asked.robot, most=MOST_PROGRAMS))
         version = changed(program, asked, author, at_ns)
         if version.number <= len(program.versions):
-            return Changed(ProgramAnswer(program=program.message, version=version), None)
+            return ProgramChange(ProgramAnswer(program=program.message, version=version), None)
         old_name = program.current.name if program.versions else version.name
         if version.change not in (ProgramVersion.DELETED, ProgramVersion.ASIDE):
             self._check_name_is_free(asked.robot, program.id, version.name)
@@ -142,7 +142,7 @@ class ProgramStore:
             raise RefusedError(codes.PROGRAMS_DISK(detail=error.strerror or error)) from None
         robot.programs[program.id] = program
         self._count(robot, version)
-        return Changed(ProgramAnswer(program=program.message, version=version), old_name)
+        return ProgramChange(ProgramAnswer(program=program.message, version=version), old_name)
 
     def read(self, asked: ProgramQuery) -> ProgramContent:
         """Return a version with its text, and all versions of its program.

@@ -13,7 +13,7 @@ from robomesh.contract.keys import WHOLE_SITE, PresenceKey, is_replay
 from robomesh.contract.messages import received_reason
 from robomesh.wire.session import CERTIFICATE
 from services.watch.conditions import Condition, condition_of
-from services.watch.mesh import Mesh, Process
+from services.watch.observed_mesh import ObservedMesh, Process
 from services.watch.settings import SETTLED_S
 
 # One per robot or per site.
@@ -66,7 +66,7 @@ class Expected:
 
 
 def mesh_conditions(
-    mesh: Mesh,
+    mesh: ObservedMesh,
     site: str,
     *,
     here: str,
@@ -97,7 +97,7 @@ def mesh_conditions(
             yield from _of_process(process, begun, now, now_s)
 
 
-def _duplicates(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
+def _duplicates(mesh: ObservedMesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
     owners: dict[tuple[str, str], list[PresenceKey]] = defaultdict(list)
     for who in tokens:
         if who.service in _UNIQUE:
@@ -120,7 +120,9 @@ def _duplicates(mesh: Mesh, tokens: list[PresenceKey]) -> Iterator[Condition]:
         )
 
 
-def _missing(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expected) -> Iterator[Condition]:
+def _missing(
+    mesh: ObservedMesh, tokens: list[PresenceKey], site: str, expected: Expected
+) -> Iterator[Condition]:
     here = {(who.service, who.robot) for who in tokens if who.site == site}
     for who in tokens:
         if who.site == site:
@@ -162,7 +164,7 @@ def _missing(mesh: Mesh, tokens: list[PresenceKey], site: str, expected: Expecte
         )
 
 
-def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]:
+def _clocks(mesh: ObservedMesh, here: str, begun: frozenset[str]) -> Iterator[Condition]:
     own = mesh.processes.get(here)
     if own is None:
         return  # the text must name both clocks
@@ -181,13 +183,13 @@ def _clocks(mesh: Mesh, here: str, begun: frozenset[str]) -> Iterator[Condition]
             )
 
 
-def largest_clock_offset_s(mesh: Mesh, here: str) -> float:
+def largest_clock_offset_s(mesh: ObservedMesh, here: str) -> float:
     """Return by how much at least the farthest host's clock differs from this watch's; on any thread."""
     readings = _clock_readings(mesh, here).values()
     return max((0.0, *(abs(offset_s) - round_trip_s / 2 for round_trip_s, offset_s in readings)))
 
 
-def _clock_readings(mesh: Mesh, here: str) -> dict[str, tuple[float, float]]:
+def _clock_readings(mesh: ObservedMesh, here: str) -> dict[str, tuple[float, float]]:
     """Return the best reading, round trip and offset, of each host's clock."""
     hosts: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for process in tuple(mesh.processes.values()):
@@ -197,7 +199,7 @@ def _clock_readings(mesh: Mesh, here: str) -> dict[str, tuple[float, float]]:
     return {host: min(readings) for host, readings in hosts.items()}
 
 
-def _versions(mesh: Mesh) -> Iterator[Condition]:
+def _versions(mesh: ObservedMesh) -> Iterator[Condition]:
     versions: dict[str, list[str]] = defaultdict(list)
     for process in mesh.processes.values():
         versions[process.health.version].append(process.name)
@@ -265,6 +267,6 @@ def _of_process(process: Process, begun: frozenset[str], now: float, now_s: floa
         )
 
 
-def _label(mesh: Mesh, who: PresenceKey) -> str:
+def _label(mesh: ObservedMesh, who: PresenceKey) -> str:
     process = mesh.processes.get(who.id)
     return process.name if process is not None else f"{who.service} ({who.site}, {who.id})"

@@ -21,7 +21,7 @@ from services.watch.alarm_registry import AlarmRegistry
 from services.watch.alarms import AlarmError
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions
 from services.watch.consistency import Expected, largest_clock_offset_s, mesh_conditions
-from services.watch.mesh import Mesh
+from services.watch.observed_mesh import ObservedMesh
 from services.watch.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -50,7 +50,7 @@ class _Watch:
 
     def __init__(self, session: Session, settings: Settings) -> None:
         self._session, self._site, self._settled_s = session, settings.site, settings.settled_s
-        self._mesh = Mesh()
+        self._mesh = ObservedMesh()
         # A clock that is set back must not hide an alarm for longer than it was shelved.
         self._clock = ForwardClock()
         self._expected = Expected(dict.fromkeys(settings.expected, ""))

@@ -9,7 +9,7 @@ from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.recorder import recorder
-from services.recorder.settings import FlightRecorder, Settings
+from services.recorder.settings import Flight, Settings
 
 Ask = schema.RecorderRequest
 KEY = "robomesh/site/arm/recorder/request"
@@ -22,7 +22,7 @@ async def recording_site(mesh, folder, **settings):
     """Run a recorder; yield a session that publishes for robot `arm`."""
     async with open_session(mesh) as service, open_session(mesh) as gateway:
         settings = Settings(
-            **{"flight": FlightRecorder(minutes=0), "views": ("front",)} | settings,
+            **{"flight": Flight(minutes=0), "views": ("front",)} | settings,
             site="site",
             robots=("arm",),
             folder=folder,

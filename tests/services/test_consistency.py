@@ -11,21 +11,21 @@ from services.errors import SiteFileError
 from services.site_file import site as site_file
 from services.watch.conditions import Condition, ConditionTracker, robot_conditions
 from services.watch.consistency import Expected, largest_clock_offset_s, mesh_conditions
-from services.watch.mesh import Mesh
+from services.watch.observed_mesh import ObservedMesh
 
 # 2026-11-22 12:00 UTC.
 EPOCH = 1795348800.0
 
 
-def mesh_of(*reports: ServiceHealth, site: str = "s") -> Mesh:
-    mesh = Mesh()
+def mesh_of(*reports: ServiceHealth, site: str = "s") -> ObservedMesh:
+    mesh = ObservedMesh()
     for health in reports:
         mesh.add_presence(PresenceKey(site, "-", health.service, health.id))
         mesh.record_health(site, health, 0.0)
     return mesh
 
 
-def found(mesh: Mesh, *, now_s: float = 1.0, begun: frozenset[str] = frozenset()) -> dict[str, str]:
+def found(mesh: ObservedMesh, *, now_s: float = 1.0, begun: frozenset[str] = frozenset()) -> dict[str, str]:
     conditions = mesh_conditions(
         mesh, "s", here="me", expected=Expected(), begun=begun, now=EPOCH + now_s, now_s=now_s
     )
@@ -173,7 +173,7 @@ def test_each_address_that_a_process_cannot_listen_on_is_a_condition():
 
 def test_a_service_that_should_run_and_was_never_seen_is_missed_after_a_minute():
     expected = Expected({("recorder", "-"): "", ("gateway", "arm"): ""})
-    mesh, tracker = Mesh(), ConditionTracker()
+    mesh, tracker = ObservedMesh(), ConditionTracker()
     mesh.add_presence(PresenceKey("s", "arm", "gateway", "a1"))
 
     def judged(now_s: float) -> list[str]:
@@ -199,7 +199,7 @@ def test_a_service_that_should_run_and_was_never_seen_is_missed_after_a_minute()
     ids=str,
 )
 def test_only_required_services_are_missed(service, robot, missed):
-    mesh, expected, who = Mesh(), Expected(), PresenceKey("s", robot, service, "a1")
+    mesh, expected, who = ObservedMesh(), Expected(), PresenceKey("s", robot, service, "a1")
 
     def gone() -> list[str]:
         conditions = mesh_conditions(

@@ -11,7 +11,7 @@ from robomesh.contract.keys import parse_key
 from robomesh.publications.subscription import Sample
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from services.console.websocket.framing import SampleBatch, batches, frame, state_frame
-from services.console.websocket.page_connection import Browser
+from services.console.websocket.page_connection import PageConnection
 from services.console.websocket.write_scheduler import WriteScheduler
 from tests.conftest import run
 
@@ -105,7 +105,8 @@ def test_a_fast_page_gets_all_in_one_write_and_a_slow_one_the_newest(monkeypatch
             [WebSocketTransport(), WebSocketTransport(), WebSocketTransport()],
         )
         browsers = [
-            Browser(None, feeds, None, greet=lambda _: ToPage(hello=ToPage.Hello()), site="s") for _ in lines
+            PageConnection(None, feeds, None, greet=lambda _: ToPage(hello=ToPage.Hello()), site="s")
+            for _ in lines
         ]
         serving = [
             asyncio.create_task(each.run(Socket(line))) for each, line in zip(browsers, lines, strict=True)
@@ -151,7 +152,7 @@ class Asked:
 def test_a_blocked_page_requests_no_key_frames():
     async def main():
         feeds, line, session = SharedSubscriptions(), WebSocketTransport(), Asked()
-        browser = Browser(session, feeds, None, greet=lambda _: ToPage(), site="s", own_name="li")
+        browser = PageConnection(session, feeds, None, greet=lambda _: ToPage(), site="s", own_name="li")
         serving = asyncio.create_task(browser.run(Socket(line, VIDEO)))
         while not feeds.sinks:
             await asyncio.sleep(0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from robomesh.wire.session import open_session
 from services.console.common.requested_views import Views
-from services.console.websocket.page_connection import Browser
+from services.console.websocket.page_connection import PageConnection
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from tests.conftest import run
 from tests.services.test_console import browse, console, page
@@ -51,7 +51,7 @@ def test_a_page_that_asks_and_never_reads_is_cut_off(mesh, monkeypatch):
     async def main():
         async with open_session(mesh) as session:
             feeds, deaf = SharedSubscriptions(session), Deaf()
-            browser = Browser(session, feeds, Views(session), greet=lambda _: ToPage(), site="s")
+            browser = PageConnection(session, feeds, Views(session), greet=lambda _: ToPage(), site="s")
             async with asyncio.timeout(30.0):
                 await browser.run(deaf)
             assert 10 < deaf.asked < 2000

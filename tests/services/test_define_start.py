@@ -17,7 +17,7 @@ from tests.site import alive, kill, robomesh, running_site, wait_until
 pytestmark = pytest.mark.processes
 
 
-def processes(site) -> dict[str, int]:
+def programs(site) -> dict[str, int]:
     """Return the process ids of all that `up` runs, by service and robot: "gateway mine"."""
     named = {}
     for pid, (service, *words) in site.services():
@@ -72,12 +72,12 @@ def page(site):
 @pytest.fixture(scope="module")
 def mine(site, page):
     """Return a started robot named mine."""
-    before = processes(site)
+    before = programs(site)
     draft = page.draft(name="mine")
     assert page.post("/save", draft).status == 200
     assert page.post("/start", {"name": "mine"}).status == 200
     wait_until(lambda: on_the_mesh(site).get("mine") == "up")
-    after = processes(site)
+    after = programs(site)
     assert {name: after[name] for name in before} == before, "nobody else was disturbed"
     assert set(after) - set(before) == {"simulate mine", "gateway mine", "kinematics mine"}
     return draft
@@ -104,13 +104,13 @@ def test_it_is_commanded_drawn_and_recorded_as_any_other(site, page, mine, tmp_p
 
 
 def test_saving_a_started_robot_restarts_only_that_robot(site, page, mine):
-    before = processes(site)
+    before = programs(site)
     mine["description"]["joint"][0]["limits"] = [-60, 60]
     assert page.post("/save", mine | {"overwrite": True}).status == 200
     own = {"simulate mine", "gateway mine", "kinematics mine"}
-    wait_until(lambda: own & set(processes(site)) == own and not any(alive(before[name]) for name in own))
+    wait_until(lambda: own & set(programs(site)) == own and not any(alive(before[name]) for name in own))
     wait_until(lambda: on_the_mesh(site).get("mine") == "up")
-    after = processes(site)
+    after = programs(site)
     assert {name: pid for name, pid in after.items() if name not in own} == {
         name: pid for name, pid in before.items() if name not in own
     }
@@ -122,27 +122,27 @@ def test_saving_a_started_robot_restarts_only_that_robot(site, page, mine):
 
 @pytest.mark.parametrize("name", ["gateway mine", "simulate mine", "console"])
 def test_a_killed_process_is_restarted(site, page, mine, name):
-    before = processes(site)
+    before = programs(site)
     workers = descendants(before["console"])
     kill(before[name])
-    wait_until(lambda: processes(site).get(name, before[name]) != before[name])
+    wait_until(lambda: programs(site).get(name, before[name]) != before[name])
     wait_until(lambda: on_the_mesh(site).get("mine") == "up")
     if name == "console":
         wait_until(lambda: not any(map(alive, workers)), what="its workers outlive it")
         wait_until(lambda: answers(page))
     else:
-        assert processes(site)["gateway"] == before["gateway"]
+        assert programs(site)["gateway"] == before["gateway"]
 
 
 def test_a_half_edited_file_ends_nothing(site, page, mine):
     file = site.folder / "robots" / "started.toml"
-    text, before = file.read_text(), processes(site)
+    text, before = file.read_text(), programs(site)
     lines = len(site.log)
     file.write_text(text + "[[robot]]\nname = ")
     wait_until(
         lambda: any("robots that were started before keep running" in line for line in site.log[lines:])
     )
-    assert processes(site) == before
+    assert programs(site) == before
     answer = page.post("/stop", {"name": "mine"})
     assert answer.status == 409
     assert "started.toml: not TOML" in answer.text
@@ -168,7 +168,7 @@ def test_a_robot_that_cannot_start_stops_nothing_and_starts_when_it_is_mended(si
 
 
 def test_taken_out_its_processes_end(site, page, mine):
-    before = processes(site)
+    before = programs(site)
     assert page.post("/stop", {"name": "mine"}).status == 200
     wait_until(lambda: not any(alive(pid) for name, pid in before.items() if name.endswith(" mine")))
     wait_until(lambda: "mine" not in on_the_mesh(site))

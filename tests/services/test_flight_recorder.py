@@ -17,7 +17,7 @@ from robomesh.recordings.writing.capture import Capture
 from robomesh.recordings.writing.reindex import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder import flight
-from services.recorder.settings import FlightRecorder
+from services.recorder.settings import Flight
 from tests.conftest import run
 from tests.refusals import refused
 from tests.services.recording import (
@@ -57,7 +57,7 @@ def test_an_event_saves_the_messages_before_and_after_it(mesh, tmp_path, monkeyp
     monkeypatch.setattr(flight.FlightRecorder, "_is_too_long", lambda recorder, now: ended.is_set())
 
     async def main():
-        async with recording_site(mesh, tmp_path, flight=FlightRecorder(after_s=3600.0)) as session:
+        async with recording_site(mesh, tmp_path, flight=Flight(after_s=600.0)) as session:
             joints = session.declare_publisher("site", "arm", "joints")
             events = session.declare_publisher("site", "arm", "events")
             await until(lambda: joints.watched and events.watched)
@@ -133,7 +133,7 @@ def test_segments_of_a_killed_flight_recorder_are_saved_at_the_next_start(mesh, 
     unreadable.write_bytes(bytes(4096))  # like a power loss
 
     async def main():
-        async with recording_site(mesh, tmp_path, flight=FlightRecorder()):
+        async with recording_site(mesh, tmp_path, flight=Flight()):
             path = await saved(tmp_path)
             await until(lambda: not segment.exists())
             return path
@@ -154,7 +154,7 @@ def test_a_save_that_was_done_before_a_kill_is_not_repeated(mesh, tmp_path):
     first.unlink()  # the process was killed here
 
     async def main():
-        async with recording_site(mesh, tmp_path, flight=FlightRecorder()) as session:
+        async with recording_site(mesh, tmp_path, flight=Flight()) as session:
             joints = session.declare_publisher("site", "arm", "joints")
             await until(lambda: joints.watched)
 
@@ -169,7 +169,7 @@ def test_a_failed_save_is_reported_and_retried(mesh, tmp_path, monkeypatch):
     (tmp_path / "arm").write_bytes(b"")  # no folder can be made there
 
     async def main():
-        async with recording_site(mesh, tmp_path, flight=FlightRecorder(after_s=0.0)) as session:
+        async with recording_site(mesh, tmp_path, flight=Flight(after_s=0.0)) as session:
             events = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
             joints = session.declare_publisher("site", "arm", "joints")
             await until(lambda: joints.watched)
@@ -195,7 +195,7 @@ def test_only_old_segments_are_removed(mesh, tmp_path, monkeypatch):
     monkeypatch.setattr(flight, "_MIN_SEGMENT_S", 0.2)
 
     async def main():
-        async with recording_site(mesh, tmp_path, flight=FlightRecorder(minutes=0.01)) as session:
+        async with recording_site(mesh, tmp_path, flight=Flight(minutes=0.01)) as session:
             joints = session.declare_publisher("site", "arm", "joints")
             await until(lambda: joints.watched)
             folder = tmp_path / ".flight" / "arm"

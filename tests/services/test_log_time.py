@@ -63,7 +63,7 @@ def test_a_slowly_created_file_dates_no_message_before_its_publication(mesh, tmp
     monkeypatch.setattr(captures, "Capture", SlowCapture)
 
     async def main():
-        async with recording_site(mesh, tmp_path, flight=None) as session:
+        async with recording_site(mesh, tmp_path) as session:
             joints = session.declare_publisher("site", "arm", "joints")
             answer = await trace_on(session, name="trial")
             await until(lambda: joints.watched)
@@ -80,7 +80,7 @@ def test_a_slowly_created_file_dates_no_message_before_its_publication(mesh, tmp
 
 def test_setting_the_clock_forward_begins_the_next_file(mesh, tmp_path, monkeypatch):
     async def main():
-        async with recording_site(mesh, tmp_path, flight=None) as session:
+        async with recording_site(mesh, tmp_path) as session:
             joints = session.declare_publisher("site", "arm", "joints")
             first = await trace_on(session, name="trial")
             await until(lambda: joints.watched)

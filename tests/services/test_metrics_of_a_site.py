@@ -19,7 +19,7 @@ from services.command_line.site.up import programs
 from services.errors import SiteFileError
 from services.site_file import site as site_file
 from services.site_file.tables.router import Metrics
-from services.supervisor import Program
+from services.supervisor import SupervisedProgram
 from tests.site import robomesh
 
 MONITORING = (Path(__file__).resolve().parents[2] / "docs" / "monitoring.md").read_text(encoding="utf-8")
@@ -72,7 +72,7 @@ def test_port_0_is_a_free_one_for_each_and_without_an_address_nobody_serves():
 
 
 def test_what_is_started_from_the_page_takes_a_free_port():
-    made = [Program(name="gateway two", arguments=("gateway",), required=False)]
+    made = [SupervisedProgram(name="gateway two", arguments=("gateway",), required=False)]
     extra = extra_with_metrics(lambda: {"two": lambda: made}, ("127.0.0.1", 9101))
     (make,) = extra().values()
     assert places(make()) == {"gateway two": "127.0.0.1:0"}

@@ -13,7 +13,7 @@ from robomesh.wire.session import Session, open_session
 from services.console.common import read_scheduler
 from services.console.common.read_scheduler import Allowance, ReadScheduler
 from services.console.websocket import shared_subscriptions, websocket_transport
-from services.console.websocket.page_connection import Browser
+from services.console.websocket.page_connection import PageConnection
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from services.console.websocket.websocket_transport import WebSocketTransport
 from tests.conftest import run
@@ -110,13 +110,13 @@ def test_the_pages_of_an_account_share_an_allowance_and_no_other_account_waits(
 ):
     monkeypatch.setattr(read_scheduler, "_ACCOUNT_PER_S", NEVER)
     monkeypatch.setattr(read_scheduler, "_ACCOUNT_AT_ONCE", 50.0)  # a connection takes 20
-    asked, ask = [], Browser._ask
+    asked, ask = [], PageConnection._ask
 
     def noted(self, request):
         asked.append((self.own_name, request.key))
         ask(self, request)
 
-    monkeypatch.setattr(Browser, "_ask", noted)
+    monkeypatch.setattr(PageConnection, "_ask", noted)
 
     async def main():
         async with two_pages(mesh, page, tmp_path) as (first, stops, li):

@@ -13,7 +13,7 @@ from robomesh.errors import RefusedError
 from robomesh.wire.session import SessionSettings
 from services.command_line.control.send import joined
 from services.command_line.record.record import _interrupted, _record, _stop
-from services.command_line.terminal.discovery import Robot
+from services.command_line.terminal.discovery import RobotAddress
 from tests.conftest import free_port, run
 from tests.services.recording import put_states, recording_site, trace_off
 from tests.services.test_recorder import fill_disk_under
@@ -41,7 +41,7 @@ def test_ctrl_c_ends_a_recording_and_prints_a_summary(mesh, router, tmp_path, ca
         async with arm_recorded(mesh, tmp_path) as other:
             recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
             await until_printed(capsys, "recording site/arm as trial; Ctrl-C ends it")
-            while not await joined(other, Robot("site", "arm")):
+            while not await joined(other, RobotAddress("site", "arm")):
                 pass
             os.kill(os.getpid(), signal.SIGINT)
             return await recording

@@ -15,8 +15,8 @@ from robomesh.schemas.robomesh_pb2 import Event, EventList, RecordingQuery
 from robomesh.wire.session import open_session
 from services.recorder import subscriptions
 from services.recorder.disk import RecordingLevel
-from services.recorder.file_writer import Part
-from services.recorder.settings import FlightRecorder
+from services.recorder.file_writer import CaptureSink
+from services.recorder.settings import Flight
 from services.recorder.subscriptions import interval_s
 from tests.conftest import run
 from tests.recordings import KEY_PICTURE, PICTURE, START_NS
@@ -89,7 +89,7 @@ def test_a_sink_receives_and_counts_as_lost_only_its_own_topics(mesh):
 
 def test_a_recording_continues_after_invalid_messages(mesh, tmp_path):
     async def main():
-        async with recording_site(mesh, tmp_path, flight=FlightRecorder(minutes=1.0)) as session:
+        async with recording_site(mesh, tmp_path, flight=Flight(minutes=1.0)) as session:
             joints = session.declare_publisher("site", "arm", "joints")
             await until(lambda: joints.watched)
             put = session.zenoh_session.put
@@ -270,7 +270,7 @@ def test_setting_the_clock_during_a_recording_shifts_no_message(tmp_path):
     about = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}
     capture = Capture(path, about, start_ns=START_NS)  # not the current time
     begun_ns = time.monotonic_ns()
-    part = Part(capture, SimpleNamespace(level=RecordingLevel.ALL), begun_ns=begun_ns)
+    part = CaptureSink(capture, SimpleNamespace(level=RecordingLevel.ALL), begun_ns=begun_ns)
     for number, at_ns in enumerate((-5_000_000_000, 0, 1_000_000_000, 2_000_000_000)):
         part.take(JOINTS, topic("joints"), Header(7, number, 0), b"", begun_ns + at_ns)
     capture.finish({})

@@ -224,7 +224,7 @@ def delete(steps):
     now = schema.Recording(name="trial", file=trial.name, robot="arm")
     work._delete(now, schema.RecordingRequest(action=4, file=trial.name, reason="test"), "li")
 
-work = changes.Changes(
+work = changes.RecordingChanges(
     folder, describe=None, is_used=lambda *_: None, free_reserve=lambda: None, report=None
 )
 for steps in range(20):

@@ -75,7 +75,7 @@ class Gateway(Owner):
 
 def sent(li):
     """Start a task with `robomesh send hall/arm run`, and return it."""
-    run = send.send_and_wait(li, discovery.Robot("hall", "arm"), "li", lambda arm: arm.run("home"))
+    run = send.send_and_wait(li, discovery.RobotAddress("hall", "arm"), "li", lambda arm: arm.run("home"))
     return asyncio.create_task(run)
 
 
@@ -188,7 +188,7 @@ def test_a_program_goes_on_when_the_reader_of_its_progress_is_gone(mesh, monkeyp
 def test_the_advice_of_a_refusal_is_a_command():
     def sentence(reason, text=""):
         error = RefusedError(reason, text=text)
-        return send.with_commands(error, discovery.Robot("hall", "arm"))
+        return send.with_commands(error, discovery.RobotAddress("hall", "arm"))
 
     assert sentence(codes.STOP_LATCHED(id=3, by="li", reason="with another lease")) == (
         "stop 3 is latched (li: with another lease): remove the cause, then `robomesh send hall/arm reset`"
@@ -224,14 +224,14 @@ def test_a_recovery_is_sent_with_its_reason(mesh):
             gateway = Gateway(own, text="power_on is on the controller's socket")
             gateway.ready.set()
             command = send._recovery(["power_on"], "fuse\nchanged", True)
-            sent = await send.send_and_wait(session, discovery.Robot("hall", "arm"), "li", command)
+            sent = await send.send_and_wait(session, discovery.RobotAddress("hall", "arm"), "li", command)
             assert (sent.accepted, sent.text) == (True, "power_on is on the controller's socket")
             (asked,) = gateway.asked
             recover = schema.Recover(recovery=schema.Recover.POWER_ON, reason="fuse changed", looked=True)
             assert asked.recover == recover
             with pytest.raises(MessageError, match="no recovery 'dance': use unlock_protective_stop"):
                 await send.send_and_wait(
-                    session, discovery.Robot("hall", "arm"), "li", send._recovery(["dance"], "x", True)
+                    session, discovery.RobotAddress("hall", "arm"), "li", send._recovery(["dance"], "x", True)
                 )
 
     run(main())

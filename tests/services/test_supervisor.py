@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from services import supervisor
-from services.supervisor import CouldNotStartError, Program, _lines, supervise
+from services.supervisor import CouldNotStartError, SupervisedProgram, _lines, supervise
 from tests.conftest import free_port, run
 from tests.site import alive, wait_until
 
@@ -21,10 +21,10 @@ FORKING = """
 import asyncio, sys
 from services import supervisor
 from services.command_line import main
-from services.supervisor import Program, fork, supervise
+from services.supervisor import SupervisedProgram, fork, supervise
 supervisor._OTHERS_AFTER_S = 1000.0
 programs = [
-    Program(name=words[0], arguments=tuple(words[1:]), required=words[0] != "optional")
+    SupervisedProgram(name=words[0], arguments=tuple(words[1:]), required=words[0] != "optional")
     for words in map(str.split, sys.argv[1:])
 ]
 async def ready():
@@ -59,7 +59,7 @@ def test_only_a_required_program_that_cannot_start_ends_the_others(monkeypatch):
     log = []
 
     async def main(required):
-        wrong = Program(name="wrong", arguments=("robot", "show", "nobody"), required=required)
+        wrong = SupervisedProgram(name="wrong", arguments=("robot", "show", "nobody"), required=required)
         await supervise([wrong], ready=never, write=log.append)
 
     with pytest.raises(CouldNotStartError, match="wrong could not start"):
@@ -85,7 +85,7 @@ def test_extra_programs_start_and_stop_while_the_others_run():
 
     def group(name):
         arguments = ("simulate", "--listen", "127.0.0.1:0")
-        return lambda: [Program(name=name, arguments=arguments, required=False)]
+        return lambda: [SupervisedProgram(name=name, arguments=arguments, required=False)]
 
     async def until(condition):
         while not condition():
@@ -108,7 +108,7 @@ def test_extra_programs_start_and_stop_while_the_others_run():
     async def main():
         supervising = asyncio.create_task(
             supervise(
-                [Program(name="rest", arguments=("simulate", "--listen", "127.0.0.1:0"))],
+                [SupervisedProgram(name="rest", arguments=("simulate", "--listen", "127.0.0.1:0"))],
                 ready=lambda: asyncio.Event().wait(),
                 write=log.append,
                 extra=lambda: dict(wanted),
@@ -149,7 +149,7 @@ def test_a_standby_replaces_a_killed_process(tmp_path, monkeypatch):
     monkeypatch.setattr(supervisor, "_STANDBY_AFTER_S", 0.1)
     site = tmp_path / "site.toml"
     site.write_text(f'site = "hall"\n[router]\nlisten = ["tcp/127.0.0.1:{free_port()}"]\n')
-    router = Program(name="router", arguments=("router", "--site", str(site)), standby=True)
+    router = SupervisedProgram(name="router", arguments=("router", "--site", str(site)), standby=True)
     log = []
 
     # Another test may have left the process that forks commands (tests/warm.py).
@@ -190,7 +190,8 @@ def test_a_temporary_lack_of_processes_ends_no_program(monkeypatch):
 
     monkeypatch.setattr(supervisor, "_start", short_of_processes)
     programs = [
-        Program(name=name, arguments=("simulate", "--listen", "127.0.0.1:0")) for name in ("rest", "late")
+        SupervisedProgram(name=name, arguments=("simulate", "--listen", "127.0.0.1:0"))
+        for name in ("rest", "late")
     ]
 
     def lines(name, words):
@@ -317,7 +318,7 @@ def test_a_program_that_cannot_be_forked_is_left_to_the_supervisor(monkeypatch):
     monkeypatch.setattr(os, "fork", fork)
     monkeypatch.setattr("gc.freeze", lambda: None)
     open_files = psutil.Process().num_fds()
-    forked = supervisor.fork([Program(name="one", arguments=("simulate",))], lambda: None)
+    forked = supervisor.fork([SupervisedProgram(name="one", arguments=("simulate",))], lambda: None)
     os.close(forked.others)
     assert not forked.children
     assert psutil.Process().num_fds() == open_files

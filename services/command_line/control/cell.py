@@ -178,7 +178,7 @@ def _changed(
     print_line("nothing was changed: --dry-run" if dry_run else f"changed: version {answer.version[:12]}")
 
 
-async def _state(session: Session, robot: discovery.Robot) -> schema.CellState:
+async def _state(session: Session, robot: discovery.RobotAddress) -> schema.CellState:
     state = await session.last(robot_key(robot.site, robot.name, "cell"), timeout_s=_TIMEOUT_S)
     if not isinstance(state, schema.CellState):
         raise CellError(f"{robot}: its gateway does not publish its cell: it is older, or has no site file")

@@ -43,7 +43,7 @@ _USAGE = (
 _RECORDER_TIMEOUT_S = 0.5
 
 
-class Sent(NamedTuple):
+class CommandOutcome(NamedTuple):
     """The end of a command: whether it was accepted and done, its text, and the check's warning."""
 
     accepted: bool
@@ -93,19 +93,23 @@ def send(
         raise typer.Exit(1)
 
 
-async def _send(name: str, words: list[str], command: _Command | None, router: str, operator: str) -> Sent:
+async def _send(
+    name: str, words: list[str], command: _Command | None, router: str, operator: str
+) -> CommandOutcome:
     async with discovery.attached(router) as session:
         robot = await discovery.find(session, name)
         if command is None:
             stopped = await request_stop(session, *robot, operator, "robomesh send stop")
-            return Sent(stopped.sent, stopped.text)
+            return CommandOutcome(stopped.sent, stopped.text)
         sent = await send_and_wait(session, robot, operator, command)
         if sent.accepted and words == _TRACE_ON:
             sent = sent._replace(text=sent.text + await joined(session, robot))
         return sent
 
 
-async def send_and_wait(session: Session, robot: discovery.Robot, operator: str, command: _Command) -> Sent:
+async def send_and_wait(
+    session: Session, robot: discovery.RobotAddress, operator: str, command: _Command
+) -> CommandOutcome:
     """Take control, and send a command; wait until its motion or program ends. Ctrl-C stops the robot."""
     started: list[CommandResult] = []  # the motion or program
 
@@ -123,7 +127,7 @@ async def send_and_wait(session: Session, robot: discovery.Robot, operator: str,
 
     try:
         answer = await _interruptible(controlled())
-        return Sent(True, "done" if started else answer.text, answer.warning)
+        return CommandOutcome(True, "done" if started else answer.text, answer.warning)
     except asyncio.CancelledError:
         if arm.stopped is None:  # the robot did not move
             raise typer.Abort from None
@@ -132,7 +136,7 @@ async def send_and_wait(session: Session, robot: discovery.Robot, operator: str,
         if isinstance(error, NoAnswerError) and not started:
             raise
         ended = with_commands(error, robot)
-    return Sent(False, ended, started[0].warning if started else "")
+    return CommandOutcome(False, ended, started[0].warning if started else "")
 
 
 async def _interruptible(waiting: Coroutine[Any, Any, T]) -> T:
@@ -156,7 +160,7 @@ def _print_step(program: schema.ProgramState) -> None:
     print_line(f"{step}, line {program.line}: {program.statement}", err=True)
 
 
-async def joined(session: Session, robot: discovery.Robot) -> str:
+async def joined(session: Session, robot: discovery.RobotAddress) -> str:
     """Return the recording that a trace joins, in words; empty: the trace has its own."""
     last = await session.last(f"robomesh/{robot}/recording", timeout_s=_RECORDER_TIMEOUT_S)
     if isinstance(last, schema.Recording) and last.open and last.started_by == "request":
@@ -164,7 +168,7 @@ async def joined(session: Session, robot: discovery.Robot) -> str:
     return ""
 
 
-def with_commands(error: CodedError, robot: discovery.Robot) -> str:
+def with_commands(error: CodedError, robot: discovery.RobotAddress) -> str:
     """Return an error's sentence, with its advice as a command to type."""
     text, reason = str(error), error.reason
     if reason.code in (codes.STOP_LATCHED.name, codes.STOP_OTHER.name):

@@ -48,7 +48,7 @@ _ANSWER_S = 3.0
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """The result of one check; `fix` says what to do if it failed."""
 
     what: str
@@ -79,12 +79,12 @@ def run(site_file: Path | None = None, as_json: bool = False) -> None:
         raise typer.Exit(1)
 
 
-def _python() -> list[Finding]:
+def _python() -> list[CheckResult]:
     version = ".".join(map(str, sys.version_info[:3]))
-    return [Finding("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")]
+    return [CheckResult("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")]
 
 
-def _extras() -> list[Finding]:
+def _extras() -> list[CheckResult]:
     findings = []
     for extra, packages in _EXTRAS.items():
         missing = [package for package in packages if is_missing(package)]
@@ -92,11 +92,11 @@ def _extras() -> list[Finding]:
         text = "its packages are installed" if not missing else f"no {', '.join(missing)}"
         if missing and rare:
             text = f"not installed; {fix} installs it"
-        findings.append(Finding(f"{'part' if rare else 'role'} {extra}", rare or not missing, text, fix))
+        findings.append(CheckResult(f"{'part' if rare else 'role'} {extra}", rare or not missing, text, fix))
     return findings
 
 
-def _drivers(site: "Site") -> Iterator[Finding]:
+def _drivers(site: "Site") -> Iterator[CheckResult]:
     """Yield whether the site's drivers of packages can be used."""
     for protocol in sorted({robot.protocol for robot in site.robot} - own_kinds().keys()):
         what, fix = f"protocol {protocol}", "correct the package, or install it again"
@@ -104,42 +104,44 @@ def _drivers(site: "Site") -> Iterator[Finding]:
             kind = kind_of(protocol)
             if missing := [module for module in kind.packages if is_missing(module)]:
                 install = install_command(kind.extra, kind.distribution)
-                yield Finding(what, False, f"no {', '.join(missing)}", install)
+                yield CheckResult(what, False, f"no {', '.join(missing)}", install)
                 continue
             driver_maker(protocol)
             part_of(protocol, "simulated", Simulated)
         except GatewaySettingsError as error:
-            yield Finding(what, False, str(error), fix)
+            yield CheckResult(what, False, str(error), fix)
         else:
-            yield Finding(what, True, f"the package {kind.distribution} is installed")
+            yield CheckResult(what, True, f"the package {kind.distribution} is installed")
 
 
-def _open_gl() -> list[Finding]:
+def _open_gl() -> list[CheckResult]:
     fix = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
     try:
         from renderer.drawing.opengl import device_name, device_names, open_context
         from renderer.errors import RendererError
     except ImportError as error:
-        return [Finding("OpenGL", False, f"its packages are missing: {error}", fix)]
+        return [CheckResult("OpenGL", False, f"its packages are missing: {error}", fix)]
     try:
         context = open_context()
     except RendererError as error:
-        return [Finding("OpenGL", False, str(error), fix)]
+        return [CheckResult("OpenGL", False, str(error), fix)]
     name = device_name(context)
     context.release()
     devices = device_names()
     listed = "; ".join(f"device {number}: {each}" for number, each in enumerate(devices))
-    return [Finding("OpenGL", True, f"off screen, by {name}" + (f" ({listed})" if len(devices) > 1 else ""))]
+    return [
+        CheckResult("OpenGL", True, f"off screen, by {name}" + (f" ({listed})" if len(devices) > 1 else ""))
+    ]
 
 
-def _page() -> list[Finding]:
+def _page() -> list[CheckResult]:
     from services.console.app import PAGE
 
     built = (PAGE / "index.html").exists()
-    return [Finding("page", built, "built" if built else "not built", "./dev up builds it")]
+    return [CheckResult("page", built, "built" if built else "not built", "./dev up builds it")]
 
 
-def _addresses(site: "Site") -> Iterator[Finding]:
+def _addresses(site: "Site") -> Iterator[CheckResult]:
     """Yield whether each address of the site can be listened on, or a running site uses it."""
     metered = first_address(site, "")
     uses: list[tuple[str, str, int, Callable[[], bool]]] = [
@@ -166,20 +168,20 @@ def _addresses(site: "Site") -> Iterator[Finding]:
     for what, host, port, is_ours in uses:
         if is_absent(host):
             text, fix = "is not this machine's address now", "bring its network up, or correct the site file"
-            yield Finding(what, False, f"{host}:{port} {text}", fix)
+            yield CheckResult(what, False, f"{host}:{port} {text}", fix)
             continue
         try:
             check_free(what, host, port, _OTHER)
         except UnavailableError as error:
             ours = is_ours()
-            yield Finding(
+            yield CheckResult(
                 what,
                 ours,
                 f"{host}:{port} is used by a running site" if ours else str(error).partition(". End")[0],
                 _END,
             )
         else:
-            yield Finding(what, True, f"{host}:{port} is free")
+            yield CheckResult(what, True, f"{host}:{port} is free")
 
 
 def _is_router(endpoint: str) -> bool:
@@ -208,11 +210,11 @@ def _serves(url: str, mark: bytes) -> bool:
         return False
 
 
-def _disk() -> list[Finding]:
+def _disk() -> list[CheckResult]:
     free = shutil.disk_usage(".").free
     writable = os.access(".", os.W_OK)
     return [
-        Finding(
+        CheckResult(
             "disk",
             writable and free > _FREE_BYTES,
             f"{free / 1e9:.1f} GB free here" + ("" if writable else ", and not writable"),

@@ -22,8 +22,8 @@ from robomesh.contract.topics import Role, Topic
 from services.command_line.doctor.security_probes import probe
 from services.command_line.doctor.security_rules import wrong_rules
 from services.command_line.doctor.security_sessions import (
+    AccessTrial,
     Person,
-    Trial,
     open_as,
     settle,
     wait_until,
@@ -111,24 +111,24 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
 # ---------------------------------------------------------------------- trials
 
 
-def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[Trial]:
+def _trials(people: list[Person], site: str, robots: Iterable[str]) -> set[AccessTrial]:
     trials = set()
     real = tuple(f"{site}/{robot}" for robot in robots)
     for who, row in product((person.principal for person in people), ROWS):
         for robot in ROBOTS:
             for name, act in product(names(row, who), tried(row, robot)):
-                trials.add(Trial(who.name, act, f"robomesh/{site}/{robot}/{name}"))
+                trials.add(AccessTrial(who.name, act, f"robomesh/{site}/{robot}/{name}"))
         for where in (*real, f"{site}x/{PROBE_ROBOT}"):
             for name, act in product(names(row, who), tried_on_real(row)):
-                trials.add(Trial(who.name, act, f"robomesh/{where}/{name}"))
+                trials.add(AccessTrial(who.name, act, f"robomesh/{where}/{name}"))
     return trials
 
 
-def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
+def _try(people: list[Person], witness: Person, site: str, trials: set[AccessTrial]) -> set[AccessTrial]:
     """Return the trials that succeeded."""
     keys = {act: sorted({trial.key for trial in trials if trial.act == act}) for act in _WORDS}
     by_name = {each.principal.name: each for each in people}
-    done: set[Trial] = set()
+    done: set[AccessTrial] = set()
 
     def of(person: Person, act: Act) -> list[str]:
         return sorted(
@@ -141,7 +141,7 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
         mark = sample.attachment.to_bytes() if sample.attachment is not None else b""
         if (name := mark.decode(errors="replace")) in by_name:
             act: Act = "delete" if sample.kind == zenoh.SampleKind.DELETE else "put"
-            done.add(Trial(name, act, str(sample.key_expr)))
+            done.add(AccessTrial(name, act, str(sample.key_expr)))
 
     with ExitStack() as declared:
         # Exact keys: a subscription to all keys of a robot would start its video.
@@ -172,7 +172,7 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
         for person in people:
             wanted = set(of(person, "declare_subscriber"))
             wait_until(partial(wanted.issubset, person.received))
-            done |= {Trial(person.principal.name, "declare_subscriber", key) for key in person.received}
+            done |= {AccessTrial(person.principal.name, "declare_subscriber", key) for key in person.received}
     # Answering: the witness queries. Wildcards separately: a session with both would answer with either.
     answered = keys["declare_queryable"]
     for vague in (False, True):
@@ -183,7 +183,7 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
                         declared.enter_context(_answering(person, key))
                 settle(person, site)
             asked = who_answers(witness, (key for key in answered if not has_wildcard(key)))
-            done |= {Trial(name, "declare_queryable", key) for name, key in chain(*asked.values())}
+            done |= {AccessTrial(name, "declare_queryable", key) for name, key in chain(*asked.values())}
     # Requesting: the witness answers.
     with ExitStack() as declared:
         for key in keys["query"]:
@@ -191,7 +191,7 @@ def _try(people: list[Person], witness: Person, site: str, trials: set[Trial]) -
         settle(witness, site)
         for person in people:
             asked = who_answers(person, of(person, "query"))
-            done |= {Trial(person.principal.name, "query", key) for key, by in asked.items() if by}
+            done |= {AccessTrial(person.principal.name, "query", key) for key, by in asked.items() if by}
     return done & trials
 
 
@@ -206,7 +206,7 @@ def _answering(person: Person, key: str) -> zenoh.Queryable[None]:
 # ---------------------------------------------------------------------- output
 
 
-def _print(people: list[Principal], site: str, done: set[Trial]) -> None:
+def _print(people: list[Principal], site: str, done: set[AccessTrial]) -> None:
     """Print a row for each topic or request, a column for each certificate, with the rights found."""
     heads = [each.name.rpartition(".")[0] for each in people]
     width = max(len(row.name) for row in ROWS) + 2
@@ -225,7 +225,7 @@ def _print(people: list[Principal], site: str, done: set[Trial]) -> None:
             keys = {f"robomesh/{site}/{robot}/{topic}" for robot in ROBOTS for topic in names(row, who)}
             cells.append(
                 "".join(
-                    letter if any(Trial(who.name, act, key) in done for key in keys) else "-"
+                    letter if any(AccessTrial(who.name, act, key) in done for key in keys) else "-"
                     for act, letter in letters.items()
                 )
             )

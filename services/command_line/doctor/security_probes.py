@@ -22,8 +22,8 @@ import zenoh
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 from services.command_line.doctor.security_sessions import (
     TIMEOUT_S,
+    AccessTrial,
     Person,
-    Trial,
     ask_all,
     settle,
     wait_until,
@@ -38,15 +38,15 @@ _REQUESTS = {
 _QUIET_S = 0.3
 
 
-class Probed(NamedTuple):
+class ProbeResult(NamedTuple):
     """The trials on the running site, those that succeeded, and the robots without a gateway."""
 
-    trials: set[Trial]
-    done: set[Trial]
+    trials: set[AccessTrial]
+    done: set[AccessTrial]
     left_out: list[str]
 
 
-def probe(people: list[Person], witness: Person, site: str, robots: Iterable[str]) -> Probed:
+def probe(people: list[Person], witness: Person, site: str, robots: Iterable[str]) -> ProbeResult:
     """Try requests and tokens on real robots, in the own and in every operator's name, and `@/**`.
 
     Args:
@@ -56,16 +56,16 @@ def probe(people: list[Person], witness: Person, site: str, robots: Iterable[str
     running = _running(witness, site, robots)
     tried = [person for person in people if person is not witness]
     operators = names_of_operators([person.principal for person in people])
-    trials = {Trial(person.principal.name, "query", ROUTERS_OWN) for person in tried}
+    trials = {AccessTrial(person.principal.name, "query", ROUTERS_OWN) for person in tried}
     for person in tried:
         who = person.principal.name
         for base in (f"robomesh/{site}/{robot}" for robot in running):
             for name in {who, *operators}:
-                trials |= {Trial(who, "query", f"{base}/{request}/{name}") for request in _REQUESTS}
+                trials |= {AccessTrial(who, "query", f"{base}/{request}/{name}") for request in _REQUESTS}
                 session = f"{name}.doctor-probe-{who.replace('.', '-')}"
-                trials.add(Trial(who, "liveliness_token", f"{base}/alive/operator/{session}"))
+                trials.add(AccessTrial(who, "liveliness_token", f"{base}/alive/operator/{session}"))
     done = _ask(tried, trials) | _declare_tokens(tried, witness, site, trials)
-    return Probed(trials, done, [robot for robot in robots if robot not in running])
+    return ProbeResult(trials, done, [robot for robot in robots if robot not in running])
 
 
 def _running(witness: Person, site: str, robots: Iterable[str]) -> list[str]:
@@ -78,16 +78,16 @@ def _running(witness: Person, site: str, robots: Iterable[str]) -> list[str]:
     return [robot for key, robot in keys.items() if key in answered]
 
 
-def _ask(people: list[Person], trials: set[Trial]) -> set[Trial]:
+def _ask(people: list[Person], trials: set[AccessTrial]) -> set[AccessTrial]:
     """Return the requests that were answered: a gateway answers a refusal, a router drops the request."""
-    done: set[Trial] = set()
+    done: set[AccessTrial] = set()
     for person in people:
         who = person.principal.name
         keys = sorted(trial.key for trial in trials if trial.who == who and trial.act == "query")
         questions = {key: _payload(key) for key in keys}
 
         def note(key: str, reply: zenoh.Reply, who: str = who) -> None:
-            done.add(Trial(who, "query", key))
+            done.add(AccessTrial(who, "query", key))
 
         ask_all(person, questions, note, of=zenoh.Locality.REMOTE)
     return done
@@ -97,12 +97,14 @@ def _payload(key: str) -> bytes | None:
     return next((payload for request, payload in _REQUESTS.items() if f"/{request}/" in key), None)
 
 
-def _declare_tokens(people: list[Person], witness: Person, site: str, trials: set[Trial]) -> set[Trial]:
+def _declare_tokens(
+    people: list[Person], witness: Person, site: str, trials: set[AccessTrial]
+) -> set[AccessTrial]:
     """Return the tokens that the witness sees."""
     tokens = {trial.key: trial for trial in trials if trial.act == "liveliness_token"}
     roles = {person.principal.name: person.principal for person in people}
     expected = {each for each in tokens.values() if should(roles[each.who], each.act, each.key)}
-    done: set[Trial] = set()
+    done: set[AccessTrial] = set()
 
     def see(sample: zenoh.Sample) -> None:
         if (trial := tokens.get(str(sample.key_expr))) is not None:

@@ -20,7 +20,7 @@ TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
-class Trial:
+class AccessTrial:
     """An operation of a principal on a key."""
 
     who: str

@@ -152,7 +152,7 @@ def export(
     width, _, height = size.partition("x")
     if not (width.isdecimal() and height.isdecimal()):
         raise typer.BadParameter(f"--size {size}: must be WIDTHxHEIGHT, as in 1280x720")
-    wanted = export.Wanted(
+    wanted = export.ExportOptions(
         begin_s=begin,
         end_s=end,
         view=view,

@@ -206,12 +206,14 @@ async def _of_mesh(text: str, router: str, query: schema.AuditQuery) -> list[_Ro
         if text:
             return await _ask(session, await discovery.find(session, text), query)
         alive = await session.present()
-        robots = sorted({discovery.Robot(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE})
+        robots = sorted(
+            {discovery.RobotAddress(key.site, key.robot) for key in alive if key.robot != WHOLE_SITE}
+        )
         answers = await asyncio.gather(*(_ask_or_warn(session, robot, query) for robot in robots))
         return [row for answer in answers for row in answer]
 
 
-async def _ask(session: Session, robot: discovery.Robot, query: schema.AuditQuery) -> list[_Row]:
+async def _ask(session: Session, robot: discovery.RobotAddress, query: schema.AuditQuery) -> list[_Row]:
     answer = await session.ask(robot_key(*robot, "audit/find"), query, timeout_s=_TIMEOUT_S)
     assert isinstance(answer, schema.AuditList)
     description = None
@@ -221,7 +223,9 @@ async def _ask(session: Session, robot: discovery.Robot, query: schema.AuditQuer
     return [_Row(str(robot), entry, joints) for entry in answer.entries]
 
 
-async def _ask_or_warn(session: Session, robot: discovery.Robot, query: schema.AuditQuery) -> list[_Row]:
+async def _ask_or_warn(
+    session: Session, robot: discovery.RobotAddress, query: schema.AuditQuery
+) -> list[_Row]:
     """Return no rows for a robot without a gateway, so that it does not hide the others."""
     alive = {(key.site, key.robot) for key in await session.present() if key.service == "gateway"}
     try:

@@ -77,7 +77,7 @@ async def _stop(text: str, router: str) -> schema.Recording:
         return await _trace_off(session, await discovery.find(session, text))
 
 
-async def _trace_off(session: Session, robot: discovery.Robot) -> schema.Recording:
+async def _trace_off(session: Session, robot: discovery.RobotAddress) -> schema.Recording:
     key = robot_key(*robot, "recorder/request")
     ended = await session.ask(key, _Request(action=_Request.TRACE_OFF), timeout_s=10.0)
     assert isinstance(ended, schema.Recording)
@@ -108,7 +108,7 @@ async def _record(text: str, name: str, views: Sequence[str], router: str) -> _D
 
 
 async def _ended(
-    session: Session, robot: discovery.Robot, states: Subscription, started: schema.Recording
+    session: Session, robot: discovery.RobotAddress, states: Subscription, started: schema.Recording
 ) -> _Done:
     """Wait until the recording ends early."""
     newest, heard_s = started, time.monotonic()

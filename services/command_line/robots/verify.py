@@ -95,7 +95,7 @@ async def _verify(
 
 
 def _of_same(
-    place: discovery.Robot, before: schema.ControllerState, now: schema.ControllerState
+    place: discovery.RobotAddress, before: schema.ControllerState, now: schema.ControllerState
 ) -> schema.ControllerState:
     """Return the present state; while a link is down, the software is not known.
 

@@ -12,7 +12,7 @@ from robomesh.listen_address import check_reach, split_address
 from services.command_line.services.table import SERVICES
 from services.command_line.terminal.output import print_text
 from services.site_file.tables.router import RoutedSite
-from services.supervisor import ExtraPrograms, Program
+from services.supervisor import ExtraPrograms, SupervisedProgram
 
 if TYPE_CHECKING:  # the router imports this module, and starts quickly
     from services.site_file.site import Site
@@ -73,7 +73,9 @@ def ports(listen: tuple[str, int]) -> dict[str, int]:
     return {name: first + number if first else 0 for number, name in enumerate(SERVICES)}
 
 
-def with_metrics(programs: Sequence[Program], listen: tuple[str, int] | None) -> tuple[Program, ...]:
+def with_metrics(
+    programs: Sequence[SupervisedProgram], listen: tuple[str, int] | None
+) -> tuple[SupervisedProgram, ...]:
     """Return the programs with `--metrics`; a simulated controller serves none.
 
     Args:
@@ -101,10 +103,10 @@ def extra_with_metrics(extra: ExtraPrograms, listen: tuple[str, int] | None) -> 
         return extra
     free = (listen[0], 0)
 
-    def started(make: Callable[[], Sequence[Program]]) -> tuple[Program, ...]:
+    def started(make: Callable[[], Sequence[SupervisedProgram]]) -> tuple[SupervisedProgram, ...]:
         return with_metrics(make(), free)
 
-    def wanted() -> dict[Hashable, Callable[[], Sequence[Program]]]:
+    def wanted() -> dict[Hashable, Callable[[], Sequence[SupervisedProgram]]]:
         return {key: partial(started, make) for key, make in extra().items()}
 
     return wanted

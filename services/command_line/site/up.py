@@ -31,7 +31,7 @@ from services.site_file import site as site_file
 from services.site_file.site import Site
 from services.site_file.started_robots import may_start, read_started
 from services.site_file.tables.robot import Robot
-from services.supervisor import ENDS_WITHIN_S, Program, fork, supervise
+from services.supervisor import ENDS_WITHIN_S, SupervisedProgram, fork, supervise
 from services.used_ports import check_free, is_used_by_child
 
 log = logging.getLogger(__name__)
@@ -75,10 +75,10 @@ def run(path: Path | None, metrics: str = "") -> None:
     )
 
 
-def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...]:
+def programs(site: Site, path: Path | None, endpoint: str) -> tuple[SupervisedProgram, ...]:
     """Every process of a site, the router first."""
     of_site, attach = _of_site(path), ("--connect", endpoint)
-    simulators: list[Program] = []
+    simulators: list[SupervisedProgram] = []
     controllers: list[str] = []
     for robot in site.robot:
         if robot.simulated:
@@ -95,9 +95,9 @@ def programs(site: Site, path: Path | None, endpoint: str) -> tuple[Program, ...
     return (_program("router", of_site), *simulators, *services)
 
 
-def _program(name: str, options: tuple[str, ...]) -> Program:
+def _program(name: str, options: tuple[str, ...]) -> SupervisedProgram:
     row = SERVICES[name]
-    return Program(
+    return SupervisedProgram(
         name=name,
         arguments=(name, *options),
         required=row.required,
@@ -107,7 +107,9 @@ def _program(name: str, options: tuple[str, ...]) -> Program:
     )
 
 
-def _programs_of_started(robot: Robot, site: str, path: Path | None, endpoint: str) -> tuple[Program, ...]:
+def _programs_of_started(
+    robot: Robot, site: str, path: Path | None, endpoint: str
+) -> tuple[SupervisedProgram, ...]:
     """Return the processes of a robot that was started from the page; it shares none with other robots."""
     attach = (*_of_site(path), "--connect", endpoint)
     simulator, controller = _simulator(robot, site, attach)
@@ -123,7 +125,7 @@ def _of_site(path: Path | None) -> tuple[str, ...]:
     return ("--site", str(path)) if path is not None else ()
 
 
-def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Program, tuple[str, ...]]:
+def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[SupervisedProgram, tuple[str, ...]]:
     """Return a robot's simulated controller, and the gateway's option with its address."""
     port = _free_port()
     demo = ("--demo",) if robot.demo else ()
@@ -138,7 +140,7 @@ def _simulator(robot: Robot, site: str, attach: tuple[str, ...]) -> tuple[Progra
     address = ("--robot", robot.model, "--listen", f"127.0.0.1:{port}")
     arguments = ("simulate", *address, *demo, *codes, *protocol, *for_)
     return (
-        Program(name=f"simulate {robot.name}", arguments=arguments, last=True),
+        SupervisedProgram(name=f"simulate {robot.name}", arguments=arguments, last=True),
         ("--controller", f"{robot.name}={controller}"),
     )
 
@@ -152,7 +154,7 @@ class _Started:
         self._entitled: list[str] | None = None
         self._problem = ""
 
-    def wanted(self) -> dict[Hashable, Callable[[], tuple[Program, ...]]]:
+    def wanted(self) -> dict[Hashable, Callable[[], tuple[SupervisedProgram, ...]]]:
         """Return the programs to run now, by a key for each robot that changes when its files are saved."""
         try:
             robots = read_started(self._site)

@@ -16,7 +16,7 @@ from services.command_line.terminal.connection_options import attachment, own_id
 T = TypeVar("T")
 
 
-class Robot(NamedTuple):
+class RobotAddress(NamedTuple):
     """A robot on the mesh."""
 
     site: str
@@ -42,7 +42,7 @@ async def attached(router: str) -> AsyncIterator[Session]:
         yield session
 
 
-async def find(session: Session, text: str) -> Robot:
+async def find(session: Session, text: str) -> RobotAddress:
     """Return the robot that `robot` or `site/robot` names.
 
     Raises:
@@ -50,7 +50,7 @@ async def find(session: Session, text: str) -> Robot:
     """
     alive = await session.present()
     try:
-        return Robot(*find_robot(alive, text))
+        return RobotAddress(*find_robot(alive, text))
     except RobotNotFoundError as error:
         if not error.found:
             gone = gone_sites(await lists(session)).keys() - {key.site for key in alive}

@@ -135,7 +135,7 @@ async def _live(name: str, router: str, count: int | None) -> None:
 class _Newest:
     """The newest value of each displayed topic."""
 
-    def __init__(self, session: Session, robot: discovery.Robot, names: Iterable[str]) -> None:
+    def __init__(self, session: Session, robot: discovery.RobotAddress, names: Iterable[str]) -> None:
         self.robot = robot
         self.replayed = is_replay(robot.name)
         self.states = 0

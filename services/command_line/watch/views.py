@@ -28,7 +28,13 @@ class View(NamedTuple):
 
 
 async def view_of(
-    session: Session, robot: discovery.Robot, name: str, *, width: int = 0, height: int = 0, fps: float = 0.0
+    session: Session,
+    robot: discovery.RobotAddress,
+    name: str,
+    *,
+    width: int = 0,
+    height: int = 0,
+    fps: float = 0.0,
 ) -> View:
     """Return a view by its name, in the requested size and rate if given.
 
@@ -54,11 +60,11 @@ async def view_of(
         ) from None
 
 
-def _views_key(session: Session, robot: discovery.Robot) -> str:
+def _views_key(session: Session, robot: discovery.RobotAddress) -> str:
     return robot_key(*robot, f"views/{session.own_name}")
 
 
-async def _rate(session: Session, robot: discovery.Robot, name: str) -> float:
+async def _rate(session: Session, robot: discovery.RobotAddress, name: str) -> float:
     """Return a view's highest rate [1/s]; 0: a recording's view, without a renderer."""
     with contextlib.suppress(RobomeshError):
         answer = await session.ask(

@@ -86,7 +86,7 @@ class ReadScheduler:
         await turn
 
 
-class InTurn:
+class RequestTurns:
     """ASGI middleware that begins one request in each turn of the event loop."""
 
     def __init__(self, app: ASGIApp) -> None:

@@ -141,7 +141,7 @@ class Pictures:
         self.stills += 1
         try:
             key = (await self.view(request)).image
-            with contextlib.closing(Watch(self.subscriptions, key, NewestQueue())) as watch:
+            with contextlib.closing(NewestSampleReader(self.subscriptions, key, NewestQueue())) as watch:
                 sample = await watch.next(_STILL_WITHIN_S)
             if sample is None:
                 raise RefusedRequest(504, codes.VIEW_NO_PICTURE(view=key, seconds=_STILL_WITHIN_S))
@@ -221,7 +221,7 @@ class Pictures:
         await pieces.aclose()
 
 
-class Watch:
+class NewestSampleReader:
     """One reader's subscription to a key; reads the newest sample.
 
     Args:
@@ -274,7 +274,7 @@ async def _prepend(first: bytes, pieces: AsyncGenerator[bytes]) -> AsyncGenerato
 async def _mjpeg_parts(
     subscriptions: SharedSubscriptions, key: str, stale_after_s: float
 ) -> AsyncGenerator[bytes]:
-    with contextlib.closing(Watch(subscriptions, key, NewestQueue())) as watch:
+    with contextlib.closing(NewestSampleReader(subscriptions, key, NewestQueue())) as watch:
         sample = await watch.next(_FIRST_WITHIN_S)
         if sample is None:
             return
@@ -292,7 +292,7 @@ async def _fragments(
 ) -> AsyncGenerator[bytes]:
     """Yield MP4 fragments. Earlier frames are shown at the start: the times are those of arrival."""
     mp4 = FragmentedMp4()
-    with contextlib.closing(Watch(subscriptions, view.video, VideoQueue())) as watch:
+    with contextlib.closing(NewestSampleReader(subscriptions, view.video, VideoQueue())) as watch:
         asking = asyncio.create_task(want_key_frame())
         try:
             while (sample := await watch.next(_SILENT_S)) is not None:

@@ -30,7 +30,7 @@ from robomesh.wire.session import Session
 from services.console.common.error_responses import as_text, with_error_responses
 from services.console.common.errors import RefusedRequest
 from services.console.common.requested_views import robot_key
-from services.console.http.pictures import Pictures, Watch
+from services.console.http.pictures import NewestSampleReader, Pictures
 from services.console.websocket.send_queues import NewestQueue
 
 PATH = "/view/{site}/{robot}/{view}"
@@ -79,7 +79,9 @@ class ViewPage:
         subscriptions = self.pictures.subscriptions
         with contextlib.ExitStack() as stack:
             watches = [
-                stack.enter_context(contextlib.closing(Watch(subscriptions, key, NewestQueue(), ready)))
+                stack.enter_context(
+                    contextlib.closing(NewestSampleReader(subscriptions, key, NewestQueue(), ready))
+                )
                 for key in (f"{robot}/controller", f"{robot}/description", image)
             ]
             greeted_at = -_GREETS_EACH_S

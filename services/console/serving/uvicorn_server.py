@@ -12,7 +12,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from robomesh.errors import ListenError
-from services.console.common.read_scheduler import READS, InTurn, ReadScheduler
+from services.console.common.read_scheduler import READS, ReadScheduler, RequestTurns
 from services.console.serving.request_timeout import Connection
 from services.console.websocket.websocket_transport import WebSocketTransport
 
@@ -30,7 +30,7 @@ def server_of(app: ASGIApp, tls: ssl.SSLContext | None) -> "Server":
     """Return a server for an application."""
     return Server(
         uvicorn.Config(
-            InTurn(app),
+            RequestTurns(app),
             ws=WebSocketTransport,
             ws_per_message_deflate=False,
             ws_max_size=_MOST_MESSAGE,

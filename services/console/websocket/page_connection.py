@@ -1,6 +1,6 @@
-"""One browser's WebSocket: sends watched samples, and forwards the page's requests.
+"""One page's WebSocket: sends watched samples, and forwards the page's requests.
 
-A slow browser delays no other: its send queues keep the newest samples, and it gets what its line can carry.
+A slow page delays no other: its send queues keep the newest samples, and it gets what its line can carry.
 """
 
 import asyncio
@@ -57,8 +57,8 @@ _POLICY_VIOLATION, _LONGEST_REASON = 1008, 120
 _NO_REQUEST = 0
 
 
-class Browser:
-    """One browser's watches and pending requests.
+class PageConnection:
+    """One page's watches and pending requests.
 
     Args:
         greet: Returns the greeting, which is sent again when it changes.
@@ -77,7 +77,7 @@ class Browser:
         subscriptions: SharedSubscriptions,
         views: Views,
         *,
-        greet: Callable[["Browser"], ToPage],
+        greet: Callable[["PageConnection"], ToPage],
         site: str,
         user: SignedIn | None = None,
         own_name: str = "",

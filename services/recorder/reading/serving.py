@@ -16,7 +16,7 @@ from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session
 from services.recorder.reading.answers import Question
-from services.recorder.reading.uses import Uses
+from services.recorder.reading.uses import RecordingUses
 
 _MODULE = "services.recorder.reading.reader"
 _NICE = 5
@@ -51,10 +51,10 @@ class RecordingServer:
         open_now: Callable[[], dict[str, schema.Recording]],
         flight: Callable[[], bool],
         quotas: Quotas = DEFAULT_QUOTAS,
-        uses: Uses | None = None,
+        uses: RecordingUses | None = None,
     ) -> None:
         self._open_now, self._flight = open_now, flight
-        self._uses = Uses() if uses is None else uses
+        self._uses = RecordingUses() if uses is None else uses
         self._fast_worker, self._series_worker = (Worker(_MODULE, folder, nice=_NICE) for _ in range(2))
         self._tasks: dict[tuple[str, bytes], asyncio.Task[bytes]] = {}
         self._mebibytes = Quota("recordings_mib", a_minute=quotas.recordings_mib_a_minute)

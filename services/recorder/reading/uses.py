@@ -18,7 +18,7 @@ class _Use(NamedTuple):
     until_s: float
 
 
-class Uses:
+class RecordingUses:
     """Clients' uses of files, by file and kind of request."""
 
     def __init__(self) -> None:

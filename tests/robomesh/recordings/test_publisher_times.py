@@ -2,6 +2,7 @@
 
 import csv
 import io
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.downsampling import SeriesReader
 from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.record.export.export import Wanted
+from services.command_line.record.export.export import ExportOptions
 from services.command_line.record.export.export import run as export
 from services.player.recording_source import RecordingSource
 from tests.recordings import START_NS, joints
@@ -51,7 +52,7 @@ def bunched(path, *, clock_ahead_ns=0):
 
 def exported(path, folder):
     out = folder / "out.csv"
-    export(str(path), out, Wanted(), "", as_json=True)
+    export(nullcontext(path), out, ExportOptions(), as_json=True)
     return out.read_text()
 
 

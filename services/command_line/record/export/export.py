@@ -15,7 +15,7 @@ _PLOTS = (".png", ".pdf", ".svg")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class ExportOptions:
     """The requested part of a recording, and options of its video.
 
     Attributes:
@@ -36,7 +36,7 @@ class Wanted:
     recorded: str = ""
 
 
-def run(source: AbstractContextManager[Path], out: Path, wanted: Wanted, as_json: bool) -> None:
+def run(source: AbstractContextManager[Path], out: Path, wanted: ExportOptions, as_json: bool) -> None:
     """Export a recording.
 
     Args:
@@ -63,7 +63,7 @@ def run(source: AbstractContextManager[Path], out: Path, wanted: Wanted, as_json
 
 
 def _write(
-    file: RecordingFile, span: Span, target: Path, kind: str, wanted: Wanted
+    file: RecordingFile, span: Span, target: Path, kind: str, wanted: ExportOptions
 ) -> tuple[str, Mapping[str, float]]:
     if kind == ".csv":
         from services.command_line.record.export.tables import write_table

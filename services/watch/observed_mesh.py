@@ -49,7 +49,7 @@ class Process:
 
 
 @dataclass
-class Mesh:
+class ObservedMesh:
     """Present processes and their reports, by identity; a process has a new identity at each start."""
 
     present: dict[str, set[PresenceKey]] = field(default_factory=dict)
