@@ -1,9 +1,9 @@
 """All benchmarks that have a target for speed, each with its peers, as one table.
 
-    ./dev run python benchmarks/run_all.py [--rows kinematics,gateway,...] [--peers-python PYTHON]
+    ./dev run python -m benchmarks run_all [--rows kinematics,gateway,...] [--peers-python PYTHON]
         [--nats-server FILE] [--minutes 20] [--growth] [--json] [--from RESULTS.json]
 
-It starts the other programs of this folder, which measure; it measures nothing itself. The rows take turns,
+It starts the other programs of this folder, which measure. The rows take turns,
 so that other load on the machine affects all of them; a ratio is that of values from the same round. The
 table has medians, and least and most in brackets. PYTHON is a separate Python with mujoco, vtk, pyrender,
 mcap, foxglove-sdk, nats-py, ikpy and roboticstoolbox-python; a nats-server beside it is found. The table
@@ -15,7 +15,6 @@ log cost over log count: 1 is proportional). It says before how long this takes.
 result too; --from prints the table of such a file again.
 """
 
-import argparse
 import contextlib
 import json
 import math
@@ -31,9 +30,13 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-HERE = Path(__file__).parent
+from typer import BadParameter, Option
+
+from benchmarks.harness.program import ROOT, chosen, say
+from benchmarks.harness.turns import spread
+
 COUNTS = (1, 10, 100)
 # A program gets this much more time than it takes on an idle machine, before it is ended.
 PATIENCE, LEAST_LIMIT_S = 6.0, 60.0
@@ -66,7 +69,7 @@ class Run:
 
     @property
     def name(self) -> str:
-        return " ".join((f"{self.program}.py", *self.arguments))
+        return " ".join((self.program, *self.arguments))
 
 
 @dataclass(frozen=True)
@@ -318,41 +321,36 @@ GROWTH = (
 # ------------------------------------------------------------------- programs
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--rows", default="", help=f"of {', '.join(ROWS)}; with --growth of "
-                        f"{', '.join(each.row for each in GROWTH)}")  # fmt: skip
-    parser.add_argument("--peers-python", default="", metavar="PYTHON")
-    parser.add_argument("--nats-server", default="", metavar="FILE")
-    parser.add_argument("--minutes", type=float, default=None, help="20; with --growth no limit")
-    parser.add_argument("--growth", action="store_true")
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--from", dest="recorded", default="", metavar="RESULTS.json")
-    arguments = parser.parse_args()
-    if arguments.recorded:
+def measure(
+    rows: Annotated[str, Option(help=f"of {', '.join(ROWS)}; with --growth of "
+                                f"{', '.join(each.row for each in GROWTH)}")] = "",
+    peers_python: Annotated[str, Option(metavar="PYTHON")] = "",
+    nats_server: Annotated[str, Option(metavar="FILE")] = "",
+    minutes: Annotated[float, Option(help="20 if 0; with --growth no limit")] = 0.0,
+    growth: Annotated[bool, Option("--growth")] = False,
+    recorded: Annotated[str, Option("--from", metavar="RESULTS.json")] = "",
+) -> Iterator[dict[str, Any]]:  # fmt: skip
+    if recorded:
         try:
-            recorded = json.loads(Path(arguments.recorded).read_text())
-            print(json.dumps(whole(recorded)) if arguments.json else markdown(recorded))
+            yield whole(json.loads(Path(recorded).read_text()))
         except (OSError, ValueError, KeyError, TypeError) as error:
-            parser.error(f"--from {arguments.recorded}: not the JSON of run_all.py: {error}")
+            raise BadParameter(f"--from {recorded}: not the JSON of run_all: {error}") from None
         return
-    known = [each.row for each in GROWTH] if arguments.growth else [*ROWS]
-    rows = [name for name in arguments.rows.split(",") if name] or known
-    if unknown := [name for name in rows if name not in known]:
-        parser.error(f"--rows {', '.join(unknown)}: no such row; choose from {', '.join(known)}")
-    if arguments.peers_python and not shutil.which(arguments.peers_python):
-        parser.error(f"--peers-python {arguments.peers_python}: no such program")
-    plan = grown(rows) if arguments.growth else rounds(rows)
-    minutes = arguments.minutes or (math.inf if arguments.growth else 20.0)
+    known = [each.row for each in GROWTH] if growth else [*ROWS]
+    names = chosen("--rows", rows, known) or known
+    if peers_python and not shutil.which(peers_python):
+        raise BadParameter(f"--peers-python {peers_python}: no such program")
+    plan = grown(names) if growth else rounds(names)
+    minutes = minutes or (math.inf if growth else 20.0)
     expected = sum(run.seconds for _, run in plan) / 60
     say(f"about {expected:.0f} minutes on two idle cores, {len(plan)} programs")
     # Both, because a shell lets background programs ignore Ctrl-C, and the programs started here would too.
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.default_int_handler)
     result = {
-        "growth": arguments.growth,
-        "rows": rows,
-        "peers": bool(arguments.peers_python),
+        "growth": growth,
+        "rows": names,
+        "peers": bool(peers_python),
         "machine": machine(),
         "begun": time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime()),
         "load_before": os.getloadavg(),
@@ -366,7 +364,9 @@ def main() -> None:
             if left_s < run.seconds:
                 outcome: dict[str, Any] = {"failed": f"not started: --minutes {minutes:g} are over"}
             else:
-                outcome = outcome_of(run, min(left_s, max(LEAST_LIMIT_S, PATIENCE * run.seconds)), arguments)
+                outcome = outcome_of(
+                    run, min(left_s, max(LEAST_LIMIT_S, PATIENCE * run.seconds)), peers_python, nats_server
+                )
             result["runs"].append(what | outcome)
             told = f"{outcome['took_s']:.0f} s" if "took_s" in outcome else "-"
             why = f": {outcome['failed']}" if "failed" in outcome else ""
@@ -374,12 +374,13 @@ def main() -> None:
     except KeyboardInterrupt:
         interrupted = True
     result |= {"took_s": time.monotonic() - begun, "load_after": os.getloadavg(), "interrupted": interrupted}
-    print(json.dumps(whole(result)) if arguments.json else markdown(result))
-    sys.exit(130 if interrupted else 0)
+    yield whole(result)
+    if interrupted:
+        sys.exit(130)
 
 
-def say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+def show(result: dict[str, Any]) -> None:
+    print(markdown(result))
 
 
 def machine() -> str:
@@ -401,15 +402,15 @@ def grown(rows: Sequence[str]) -> list[tuple[int, Run]]:
     return [(count, each.run(count)) for each in GROWTH if each.row in rows for count in COUNTS]
 
 
-def outcome_of(run: Run, limit_s: float, arguments: Any) -> dict[str, Any]:
+def outcome_of(run: Run, limit_s: float, peers_python: str, nats: str) -> dict[str, Any]:
     """Run a program to its end, and return its result, or why it has none.
 
     Ctrl-C and the limit end the program and all that it started.
     """
-    command = [sys.executable, str(HERE / f"{run.program}.py"), *run.arguments, "--json"]
-    if run.peers and arguments.peers_python:
-        command += ["--peers-python", arguments.peers_python]
-        if run.program == "fanout" and (server := nats_server(arguments)):
+    command = [sys.executable, "-m", "benchmarks", run.program, *run.arguments, "--json"]
+    if run.peers and peers_python:
+        command += ["--peers-python", peers_python]
+        if run.program == "fanout" and (server := nats or nats_beside(peers_python)):
             command += ["--nats-server", server]
     begun = time.monotonic()
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as errors:
@@ -418,7 +419,7 @@ def outcome_of(run: Run, limit_s: float, arguments: Any) -> dict[str, Any]:
             stdout=out,
             stderr=errors,
             stdin=subprocess.DEVNULL,
-            cwd=HERE.parent,
+            cwd=ROOT,
             start_new_session=True,
         )
         try:
@@ -445,9 +446,10 @@ def outcome_of(run: Run, limit_s: float, arguments: Any) -> dict[str, Any]:
     return result
 
 
-def nats_server(arguments: Any) -> str:
-    beside = Path(shutil.which(arguments.peers_python) or "").with_name("nats-server")
-    return arguments.nats_server or (str(beside) if beside.exists() else "")
+def nats_beside(python: str) -> str:
+    """Return the nats-server in the folder of a Python; "" if it has none."""
+    server = Path(shutil.which(python) or "").with_name("nats-server")
+    return str(server) if server.exists() else ""
 
 
 def end(process: "subprocess.Popen[bytes]") -> None:
@@ -503,13 +505,13 @@ def line_of(line: Line, result: dict[str, Any]) -> dict[str, Any]:
             ratios.setdefault(peer, []).extend(
                 mine / theirs for mine, theirs in zip(own_values, listed(value), strict=False) if theirs
             )
-    failed = dict.fromkeys(f"{run['program']}.py: {run['failed']}" for run in runs if "failed" in run)
+    failed = dict.fromkeys(f"{run['program']}: {run['failed']}" for run in runs if "failed" in run)
     return {
         "work": line.work,
         "unit": line.unit,
-        "today": spread(ours),
-        "peers": {peer: spread(values) for peer, values in peers.items()},
-        "ratios": {peer: spread(values) for peer, values in ratios.items()},
+        "today": spread_of(ours),
+        "peers": {peer: spread_of(values) for peer, values in peers.items()},
+        "ratios": {peer: spread_of(values) for peer, values in ratios.items()},
         "reach": line.reach,
         "missing": [peer for peer in line.peers if not peers.get(peer)],
         "failed": [*failed],
@@ -522,11 +524,9 @@ def listed(value: float | list[float]) -> list[float]:
     return [each for each in values if each is not None and math.isfinite(each)]
 
 
-def spread(values: Sequence[float]) -> dict[str, float] | None:
+def spread_of(values: Sequence[float]) -> dict[str, float] | None:
     """Return median, least, most and number of values; None if there are none."""
-    if not values:
-        return None
-    return {"median": statistics.median(values), "least": min(values), "most": max(values), "n": len(values)}
+    return {**spread(values), "n": len(values)} if values else None
 
 
 def growth_table(result: dict[str, Any]) -> list[dict[str, Any]]:
@@ -579,7 +579,7 @@ def exponent(costs: dict[int, float]) -> float | None:
 def markdown(result: dict[str, Any]) -> str:
     """Return the table in Markdown, with what it was measured on."""
     lines = growth_markdown(result) if result["growth"] else table_markdown(result)
-    command = "benchmarks/run_all.py" + (" --growth" if result["growth"] else "")
+    command = "benchmarks run_all" + (" --growth" if result["growth"] else "")
     lines += [
         "",
         f"{result['machine']}; {result['begun']}, {result['took_s'] / 60:.1f} minutes (`{command}`); load "
@@ -650,7 +650,3 @@ def figure(value: float) -> str:
 
 def escaped(text: str) -> str:
     return text.replace("|", "\\|")
-
-
-if __name__ == "__main__":
-    main()

@@ -21,7 +21,7 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 NOT_CHECKED = {"all", "example-robots"}
 # Extras that lack a wheel, as docs/deploy.md says.
 EXCEPTIONS: dict[str, set[str]] = {"x86_64": set(), "aarch64": {"simulator", "renderer"}}
-# They run beside the arms, where no OpenGL is.
+# They run next to the arms, where no OpenGL is.
 SMALL = ("router", "gateway", "recorder")
 OPEN_GL = {"glcontext", "moderngl", "pyglet", "pyopengl"}
 TIME_LIMIT_S = 300.0

@@ -126,7 +126,7 @@ def running_site(
 def lean(services: Sequence[str] = EVERY_SERVICE) -> dict[str, Any]:
     """Return the options of `running_file` for these services only, and for few states a second."""
     return {
-        # Whoever reads its command line finds `robomesh up`.
+        # A reader of its command line finds `robomesh up`.
         "program": (sys.executable, "-P", str(LEAN_UP), "robomesh"),
         "environment": {"TEST_SERVICES": ",".join(services), "TEST_RATE_HZ": f"{RATE_HZ:g}"},
     }

@@ -365,7 +365,7 @@ def keep_picture(page, name):
     PICTURES.mkdir(exist_ok=True)
     for width, height in PICTURE_SIZES:
         page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(300)  # what is drawn on a canvas follows its size
+        page.wait_for_timeout(300)  # a drawing on a canvas follows its size
         page.screenshot(path=PICTURES / f"{name}-{width}.png")
     page.set_viewport_size(size)
 

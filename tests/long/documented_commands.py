@@ -91,10 +91,10 @@ COMMANDS = {
     ),
     "robomesh accounts add": How(typed=("robomesh accounts add --help",)),
     # The figures take 20 minutes; these are a tenth of them.
-    "./dev run python benchmarks/command.py": How(
-        typed=("./dev run python benchmarks/command.py --dead-man 10 --race 1000 --stops 30 --beside 12",)
+    "./dev run python -m benchmarks command": How(
+        typed=("./dev run python -m benchmarks command --dead-man 10 --race 1000 --stops 30 --beside 12",)
     ),
-    "./dev run python benchmarks/latency.py": How(),
+    "./dev run python -m benchmarks latency": How(),
     "./dev run python -m tests.soak.recorder_kills --times 50": How(
         typed=("./dev run python -m tests.soak.recorder_kills --times 5",)
     ),

@@ -16,7 +16,7 @@ SHAPES = LIBRARY / "pt500" / "meshes"
 
 def drop(page, *files):
     """Drop files over the page, as from a file manager."""
-    expect(page.get_by_role("heading", level=1)).to_be_visible()  # it takes what is dropped now
+    expect(page.get_by_role("heading", level=1)).to_be_visible()  # it takes dropped files now
     contents = [[name, base64.b64encode(content).decode()] for name, content in files]
     page.evaluate(
         """(files) => {

@@ -414,7 +414,7 @@ def test_a_urdf_and_files_of_one_name_are_read_in_one_drop_and_unused_ones_are_n
     expect(notices).to_contain_text("two.urdf read: 4 of its 4 mesh files found.")
     expect(notices).to_contain_text("Not used by this robot: spare.stl, notes.txt.")
     expect(drawing(page)).to_have_attribute("data-shapes", "2")
-    # The finer one is what is seen.
+    # The page draws the finer one.
     choose(page, 0)
     expect(page.get_by_role("main")).to_contain_text("31 triangles")
 

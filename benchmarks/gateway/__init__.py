@@ -1,0 +1,1 @@
+"""Programs that measure the gateway: units, stops, control, faults, kinds of controllers."""

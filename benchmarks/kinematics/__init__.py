@@ -1,0 +1,1 @@
+"""Programs that measure kinematics, checks of collisions, and the reading of meshes."""

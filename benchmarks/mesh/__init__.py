@@ -1,0 +1,1 @@
+"""Programs that measure the mesh: fan-out, Python clients, linked sites, lines over a wide area."""

@@ -1,0 +1,1 @@
+"""Programs that measure pictures and video streams."""
