@@ -30,6 +30,7 @@ from robomesh.recordings.records import (
     check_unpacked,
     stream_of,
     unpack_chunk,
+    walk,
     walk_chunk,
 )
 
@@ -251,8 +252,15 @@ class _Scan:
         Raises:
             DAMAGE: One of these, if a record cannot be read.
         """
-        stream.seek(self.offset)
-        _scan(stream, self)
+        for opcode, body, end in walk(stream, self.offset):
+            if opcode in (Opcode.DATA_END, Opcode.FOOTER):
+                break
+            if opcode == Opcode.MESSAGE:
+                channel, _, log_time, _ = MESSAGE.unpack_from(body)
+                self.message(self.offset, end - self.offset, channel, log_time)
+            else:
+                _note(self, opcode, self.offset, body)
+            self.offset = end
         begin = max(self.offset - _COMPARED_BYTES, 0)
         stream.seek(begin)
         self.before = stream.read(self.offset - begin)
@@ -321,36 +329,6 @@ class _Scans:
 
 
 _scans = _Scans()
-
-
-def _scan(stream: IO[bytes], scan: _Scan) -> None:
-    offset = scan.offset
-    buffer, at = b"", 0
-    while True:
-        if len(buffer) - at < RECORD.size + MESSAGE.size:
-            buffer, at = buffer[at:] + stream.read(_BLOCK_BYTES), 0
-            if len(buffer) < RECORD.size:
-                break
-        opcode, length = RECORD.unpack_from(buffer, at)
-        size = RECORD.size + length
-        if opcode in (0, Opcode.DATA_END, Opcode.FOOTER):
-            break
-        if opcode != Opcode.MESSAGE or len(buffer) - at < size:
-            missing = size - (len(buffer) - at)
-            if missing > 0:
-                if missing > MOST_RECORD_BYTES:
-                    break  # an invalid length: the file is damaged from here on
-                buffer, at = buffer[at:] + stream.read(max(missing, _BLOCK_BYTES)), 0
-                if len(buffer) < size:
-                    break  # an incomplete record, because the writer was killed
-        if opcode == Opcode.MESSAGE:
-            channel, _, log_time, _ = MESSAGE.unpack_from(buffer, at + RECORD.size)
-            scan.message(offset, size, channel, log_time)
-        else:
-            _note(scan, opcode, offset, buffer[at + RECORD.size : at + size])
-        at += size
-        offset += size
-        scan.offset = offset
 
 
 def _note(scan: _Scan, opcode: int, offset: int, content: bytes) -> None:

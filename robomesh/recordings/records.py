@@ -87,31 +87,34 @@ def number_in(text: str) -> int:
     return int(text) if text.isdecimal() and len(text) < 10 else 0
 
 
-def walk(stream: IO[bytes]) -> Iterator[tuple[int, bytes, int]]:
+def walk(stream: IO[bytes], begin: int = 0) -> Iterator[tuple[int, bytes, int]]:
     """Yield opcode, body and end [bytes from the file's beginning] of every complete record up to DATA_END.
 
     Stops before DATA_END if the file is truncated, or a record's length is invalid.
+
+    Args:
+        begin: Position of a record at which to begin; 0: the file's beginning.
     """
-    if stream.read(len(MAGIC)) != MAGIC:
+    stream.seek(begin)
+    if not begin and stream.read(len(MAGIC)) != MAGIC:
         raise ValueError("not an MCAP file: its first bytes are wrong")
-    buffer, at, end = b"", 0, len(MAGIC)
+    buffer, at, end, head = b"", 0, begin or len(MAGIC), RECORD.size
     while True:
-        if len(buffer) - at < RECORD.size:
+        if len(buffer) - at < head:
             buffer, at = buffer[at:] + stream.read(_READ_BYTES), 0
-            if len(buffer) < RECORD.size:
+            if len(buffer) < head:
                 return
         opcode, length = RECORD.unpack_from(buffer, at)
         if not opcode or length > MOST_RECORD_BYTES:
             return
-        missing = RECORD.size + length - (len(buffer) - at)
-        if missing > 0:
-            buffer, at = buffer[at:] + stream.read(max(missing, _READ_BYTES)), 0
-            if len(buffer) < RECORD.size + length:
+        after = at + head + length
+        if after > len(buffer):
+            buffer, at, after = buffer[at:] + stream.read(max(length, _READ_BYTES)), 0, head + length
+            if len(buffer) < after:
                 return
-        body = buffer[at + RECORD.size : at + RECORD.size + length]
-        at += RECORD.size + length
-        end += RECORD.size + length
-        yield opcode, body, end
+        end += after - at
+        yield opcode, buffer[at + head : after], end
+        at = after
         if opcode == Opcode.DATA_END:
             return
 

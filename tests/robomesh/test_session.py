@@ -23,6 +23,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import MOST_OF_ONE, name_of
 from robomesh.wire.session import SessionSettings, open_session
 from tests.conftest import free_port, put_unheard, run
+from tests.protocol_gateway.gateway_site import until
 from tests.refusals import refused
 
 
@@ -30,12 +31,6 @@ def joints(value: float) -> JointStates:
     message = JointStates()
     message.joints.add(name="waist", position=value)
     return message
-
-
-async def until(condition, timeout_s=30.0):
-    async with asyncio.timeout(timeout_s):
-        while not condition():
-            await asyncio.sleep(0.01)
 
 
 async def answered(session, key):

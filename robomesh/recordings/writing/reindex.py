@@ -196,7 +196,6 @@ def _copy(path: Path, writer: IndexedWriter, report: Callable[[int], None]) -> N
     source, reported, end, whole = _Source(writer, size), 0, 0, False
     with path.open("rb") as stream:
         statistics = _statistics(stream)
-        stream.seek(0)
         try:
             for opcode, body, after in records.walk(stream) if size >= len(records.MAGIC) else ():
                 whole = opcode == Opcode.DATA_END
