@@ -14,7 +14,7 @@ ALLOWED = {
         "test_with_accounts_another_site_needs_a_token_although_the_browser_is_signed_in",
     },
     "test_events_page.py": {"isolated"},
-    "test_lichtblick.py": {"test_the_arm_has_the_silhouette_of_its_meshes_and_its_colours"},
+    "test_lichtblick.py": {"test_the_arm_has_the_silhouette_of_its_shapes_and_its_colours"},
     "test_recordings_page.py": {"curves_area", "moment_line", "note_range"},
 }
 

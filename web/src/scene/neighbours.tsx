@@ -1,6 +1,8 @@
 // Other robots of the cell in a robot's 3-D view.
 
+import { fromBinary } from "@bufbuild/protobuf";
 import { useEffect, useRef } from "preact/hooks";
+import { FrameTransformsSchema } from "../gen/foxglove/FrameTransforms_pb";
 import type { Description } from "../gen/robomesh_pb";
 import { DescriptionSchema } from "../gen/robomesh_pb";
 import { watch } from "../mesh/console/connection";
@@ -36,7 +38,7 @@ function Neighbour(props: { robotKey: string; description: Description; scene: R
     const made = scene.addNeighbour(robotKey.split("/").slice(1).join("/"), description);
     arm.current = made;
     const stop = watch(`${robotKey}/frames`, (sample) =>
-      made.placeFrames(sample.payload, sample.sourceTime, sample.arrived),
+      made.placeFrames(fromBinary(FrameTransformsSchema, sample.payload), sample.sourceTime, sample.arrived),
     );
     return () => {
       stop();

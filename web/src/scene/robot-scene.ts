@@ -1,6 +1,10 @@
 // The live 3-D picture of one robot, drawn only after a change.
 
+import { fromBinary } from "@bufbuild/protobuf";
 import * as THREE from "three";
+import type { FrameTransforms } from "../gen/foxglove/FrameTransforms_pb";
+import { FrameTransformsSchema } from "../gen/foxglove/FrameTransforms_pb";
+import { JointStatesSchema } from "../gen/foxglove/JointStates_pb";
 import type { Description, View } from "../gen/robomesh_pb";
 import type { Sample } from "../mesh/console/connection";
 import { watch } from "../mesh/console/connection";
@@ -224,15 +228,15 @@ export class RobotScene {
     this.unfollow = watch(`${this.robotKey}/${topic}`, (sample) => {
       this.received.push(sample);
       if (this.received.length > KEPT_SAMPLES) this.received.shift();
-      const frames = topic === "frames" ? sample.payload : this.framesFrom(sample.payload);
-      this.arm.placeFrames(frames, sample.sourceTime, sample.arrived);
+      this.arm.placeFrames(this.framesIn(topic, sample.payload), sample.sourceTime, sample.arrived);
       if (this.clearance.waits) this.loop.wake();
       this.reportPicture();
     });
   }
 
-  private framesFrom(joints: Uint8Array): Uint8Array {
-    return this.state ? framesOfJoints(this.prefix, this.state.description, this.forward, joints) : new Uint8Array();
+  private framesIn(topic: SceneState["topic"], payload: Uint8Array): FrameTransforms {
+    if (topic === "frames" || !this.state) return fromBinary(FrameTransformsSchema, payload);
+    return framesOfJoints(this.prefix, this.state.description, this.forward, fromBinary(JointStatesSchema, payload));
   }
 
   /** Report the publication that is drawn. */

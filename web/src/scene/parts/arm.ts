@@ -1,8 +1,7 @@
 // An arm in the 3-D view: links at their frames, grey when those are stale, and its ghost.
 
-import { fromBinary } from "@bufbuild/protobuf";
 import * as THREE from "three";
-import { FrameTransformsSchema } from "../../gen/foxglove/FrameTransforms_pb";
+import type { FrameTransforms } from "../../gen/foxglove/FrameTransforms_pb";
 import type { Description } from "../../gen/robomesh_pb";
 import { FramePlayer } from "./frame-player";
 import type { Kind } from "./models";
@@ -63,10 +62,8 @@ export class Arm {
     this.player.touch();
   }
 
-  /** Add a FrameTransforms payload. */
-  placeFrames(payload: Uint8Array, sourceTimeMs: number, arrivedMs: number): void {
-    const message = fromBinary(FrameTransformsSchema, payload);
-    if (this.player.add(message, sourceTimeMs, arrivedMs)) this.changed();
+  placeFrames(frames: FrameTransforms, sourceTimeMs: number, arrivedMs: number): void {
+    if (this.player.add(frames, sourceTimeMs, arrivedMs)) this.changed();
   }
 
   /** Place the links at a time of the page's clock [ms]; null: unchanged. */

@@ -1,23 +1,22 @@
 // Placements of the links computed from joint states, for a slow link that carries no frames.
 
-import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
+import { create } from "@bufbuild/protobuf";
 import * as THREE from "three";
+import type { FrameTransforms } from "../../gen/foxglove/FrameTransforms_pb";
 import { FrameTransformsSchema } from "../../gen/foxglove/FrameTransforms_pb";
-import { JointStatesSchema } from "../../gen/foxglove/JointStates_pb";
+import type { JointStates } from "../../gen/foxglove/JointStates_pb";
 import type { Description } from "../../gen/robomesh_pb";
 import type { Forward } from "./forward-kinematics";
 
-/** Convert a payload of JointStates to one of FrameTransforms. */
+/** Return the frames of joint states. */
 export function framesOfJoints(
   prefix: string,
   { joints, frames, baseToSite }: Description,
   forward: Forward,
-  payload: Uint8Array,
-): Uint8Array {
+  states: JointStates,
+): FrameTransforms {
   const base = matrixOf(baseToSite);
-  const positionsByName = new Map(
-    fromBinary(JointStatesSchema, payload).joints.map(({ name, position }) => [name, position]),
-  );
+  const positionsByName = new Map(states.joints.map(({ name, position }) => [name, position]));
   const placements = forward(joints.map(({ name, home }) => positionsByName.get(name) ?? home));
   const named = frames.flatMap(({ name, link, frameToLink }): [string, THREE.Matrix4][] => {
     const placement = placements.get(link);
@@ -33,7 +32,7 @@ export function framesOfJoints(
       rotation: { x, y, z, w },
     };
   });
-  return toBinary(FrameTransformsSchema, create(FrameTransformsSchema, { transforms }));
+  return create(FrameTransformsSchema, { transforms });
 }
 
 /** Read 16 doubles by rows; anything else is the identity. */
