@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from renderer.encoding.encoder import H264Encoder
-from renderer.encoding.h264_sps import picture_size
 from renderer.encoding.mp4 import FragmentedMp4
 from renderer.errors import Mp4Error
-from robomesh.recordings.h264 import is_key_frame
+from robomesh.recordings.h264 import is_key_frame, picture_size
 
 # Not a multiple of 16: the parameter set has a cropping rectangle.
 SIZE = (334, 190)
@@ -113,5 +112,8 @@ def test_the_size_is_read_from_the_parameter_set(size):
 
 @pytest.mark.parametrize("sps", [b"\x67", b"\x67\x42", b"\x67" + b"\0" * 9, b"\x67\x64\x00\x1f\x00"])
 def test_an_invalid_parameter_set_is_rejected(sps):
-    with pytest.raises(Mp4Error, match=r"truncated|not supported|not 4:2:0"):
+    reason = r"truncated|not supported|not 4:2:0"
+    with pytest.raises(ValueError, match=reason):
         picture_size(sps)
+    with pytest.raises(Mp4Error, match=reason):
+        FragmentedMp4().add(b"\0\0\1" + sps + b"\0\0\1\x68\x01\0\0\1\x65abc", START_NS)
