@@ -6,12 +6,12 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import cv2
+from pydantic import Field
 
 from renderer.drawing.studio import Drawn, Studio, open_thread
 from renderer.encoding.encoder import best_codec
@@ -26,6 +26,7 @@ from renderer.service.frame_scheduler import FrameScheduler, next_view
 from renderer.service.robots import Robots
 from renderer.service.stream import Stream
 from renderer.service.view_budget import ViewBudget
+from renderer.settings import Renderer
 from renderer.shapes.cache import cache_folder
 from robomesh import reason_codes as codes
 from robomesh.contract.keys import CLOSE, FAR, FREE, WHOLE_SITE
@@ -45,47 +46,27 @@ _TIDY_EACH_S = 1.0
 _FIRST_WATCHER_WITHIN_S, _NEXT_WATCHER_WITHIN_S = 10.0, 5.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Settings:
+class Settings(Renderer):
     """A site's renderer.
 
     Attributes:
         robots: Names of the robots to draw; empty: every robot of the site.
-        views: Views of each robot, in addition to a close-up that follows the arm and one for slow links.
-        size: Width and height of the pictures, both even [px].
-        fps: Highest rate of a view's video [1/s].
-        samples: Samples per pixel for anti-aliasing; 0: none.
-        shading: "fast" or "full".
-        device: Number of the EGL device; None: the first GPU that works, or software.
-        most_views: Largest number of requested views, for all robots together.
         quotas: Quotas of each operator.
         folder: Cache folder of the shapes.
     """
 
     site: str
     robots: tuple[str, ...] = ()
-    views: tuple[str, ...] = ("front", "top", "left", "free")
-    size: tuple[int, int] = (1280, 720)
-    fps: float = 30.0
-    samples: int = 4
-    shading: str = "fast"
-    device: int | None = None
-    most_views: int = 32
     quotas: Quotas = DEFAULT_QUOTAS
-    folder: Path = field(default_factory=cache_folder)
+    folder: Path = Field(default_factory=cache_folder)
 
 
 async def serve(session: Session, settings: Settings) -> None:
     """Render until cancelled.
 
     Raises:
-        RendererError: If OpenGL or the encoder is missing, or the size is not possible.
+        RendererError: If OpenGL or the encoder is missing.
     """
-    width, height = settings.size
-    if width % 2 or height % 2 or not 64 <= width <= 4096 or not 64 <= height <= 4096:
-        raise RendererError(f"renderer size {width} x {height}: must be even numbers from 64 to 4096")
-    if not 1.0 <= settings.fps <= 120.0:
-        raise RendererError(f"renderer fps {settings.fps:g}: must be from 1 to 120")
     # OpenCV's own threads wait actively: on 16 cores they took a third of the processor time, and saved none.
     cv2.setNumThreads(1)
     with contextlib.ExitStack() as threads:
@@ -95,7 +76,7 @@ async def serve(session: Session, settings: Settings) -> None:
             drawing,
             Studio,
             settings.size,
-            samples=settings.samples,
+            samples=settings.anti_aliasing,
             shading=settings.shading,
             device=settings.device,
             folder=settings.folder,

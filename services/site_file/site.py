@@ -19,6 +19,7 @@ from pydantic import (
 )
 
 from protocol_gateway.seam.table import PART_CONFIG, Table
+from renderer.settings import ALWAYS_RENDERED, Renderer
 from robomesh.errors import ListenError
 from robomesh.listen_address import (
     cannot_both_listen,
@@ -38,7 +39,6 @@ from services.site_file.tables.console import Console
 from services.site_file.tables.console import resolve_paths as resolve_console_paths
 from services.site_file.tables.fixtures import Fixture, fixture_problem, name_problem
 from services.site_file.tables.quotas import Quotas
-from services.site_file.tables.renderer import ALWAYS_RENDERED, Renderer
 from services.site_file.tables.robot import Robot
 from services.site_file.tables.router import RoutedSite, resolve_paths
 from services.site_file.validation_errors import sentence

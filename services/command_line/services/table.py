@@ -176,17 +176,7 @@ def _store(site: "Site", _: Options) -> Any:
 def _renderer(site: "Site", _: Options) -> Any:
     from renderer.service import Settings
 
-    return Settings(
-        site=site.site,
-        views=site.renderer.views,
-        size=site.renderer.size,
-        fps=site.renderer.fps,
-        samples=site.renderer.anti_aliasing,
-        shading=site.renderer.shading,
-        device=site.renderer.device,
-        most_views=site.renderer.most_views,
-        quotas=site.quotas.settings,
-    )
+    return Settings(**dict(site.renderer), site=site.site, quotas=site.quotas.settings)
 
 
 # In the order in which `robomesh up` starts them, and of the ports of their metrics: append a new service.

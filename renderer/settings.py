@@ -1,10 +1,9 @@
-"""The site file's `[renderer]`."""
+"""The site file's `[renderer]`; the settings of the service extend it."""
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract.keys import CLOSE, FAR
 
 Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
@@ -27,7 +26,8 @@ class Renderer(BaseModel):
         most_views: Largest number of requested views, for all robots together.
     """
 
-    model_config = PART_CONFIG
+    # Unknown keys are errors, and so are NaN and infinity.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     views: tuple[str, ...] = ("front", "top", "left", "free")
     # Even numbers: H.264 halves the resolution of colour.
     size: tuple[Pixels, Pixels] = (1280, 720)
