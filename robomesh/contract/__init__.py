@@ -1,1 +1,4 @@
-"""What all sites agree on: keys, topics, messages, their header, addresses and rights. Nothing is sent."""
+"""The agreement of all sites: keys, topics, messages, their header, addresses, rights and quotas.
+
+Nothing is sent or received here.
+"""

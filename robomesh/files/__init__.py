@@ -1,1 +1,1 @@
-"""Files and processes: atomic writes, workers with a limit of memory, forks. Nothing of the mesh."""
+"""Files and processes of this machine: atomic writes, workers with limits, forks; nothing of the mesh."""

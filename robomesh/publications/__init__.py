@@ -1,1 +1,1 @@
-"""What is published and subscribed to: order, losses, the values that late joiners get."""
+"""Publishers and subscriptions: order, losses, delay, and the last values for late joiners; no requests."""

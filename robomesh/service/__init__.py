@@ -1,1 +1,1 @@
-"""What each service is: it runs until a signal, has a clock, health and metrics."""
+"""A process of the mesh: it runs until a signal, and has presence, health, a clock and metrics."""
