@@ -9,7 +9,6 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from robomesh.contract.header import Header
 from robomesh.publications.delay import Delay
 from robomesh.wire.session import open_session
-from tests.conftest import run
 
 S = 10**9
 EPOCH_NS = 1_790_000_000 * S
@@ -27,25 +26,22 @@ def test_delay_is_the_time_above_the_quickest_sample_for_any_clock_offset(offset
     assert late == pytest.approx([0.0, 0.0, 1.48, 1.48, 0.0], abs=0.01)
 
 
-def test_two_quicker_samples_lower_the_least_lag():
+@pytest.mark.parametrize(
+    ("arrivals", "expected"),
+    [
+        ([(0.0, 3.0), (3.0, 3.1), (3.1, 3.2), (0.2, 3.3)], [0.0, 0.0, 0.0, 3.0]),
+        # An hour ahead: one sample, and the first one.
+        (
+            [(0.0, 0.1), (3600.0, 0.2), (0.3, 0.4), (0.4, 0.5), (0.5, 2.6), (3605.0, 2.7), (0.6, 2.7)],
+            [0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0],
+        ),
+        ([(3600.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 2.4)], [0.0, 0.0, 0.0, 2.0]),
+    ],
+)
+def test_two_quicker_samples_lower_the_least_lag_and_one_dated_ahead_does_not(arrivals, expected):
     delay = Delay()
-    arrivals = [(0.0, 3.0), (3.0, 3.1), (3.1, 3.2), (0.2, 3.3)]
     late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(arrivals, 1)]
-    assert late == pytest.approx([0.0, 0.0, 0.0, 3.0], abs=0.01)
-
-
-def test_one_sample_dated_an_hour_ahead_changes_no_other_delay():
-    delay = Delay()
-    arrivals = [(0.0, 0.1), (3600.0, 0.2), (0.3, 0.4), (0.4, 0.5), (0.5, 2.6), (3605.0, 2.7), (0.6, 2.7)]
-    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(arrivals, 1)]
-    assert late == pytest.approx([0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0], abs=0.01)
-
-
-def test_first_sample_dated_an_hour_ahead_changes_no_other_delay():
-    delay = Delay()
-    arrivals = [(3600.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 2.4)]
-    late = [delay.of(header(n, at), got) for n, (at, got) in enumerate(arrivals, 1)]
-    assert late == pytest.approx([0.0, 0.0, 0.0, 2.0], abs=0.01)
+    assert late == pytest.approx(expected, abs=0.01)
 
 
 @pytest.mark.parametrize("clock_s", [-5.0, 0.0, 5.0])
@@ -81,36 +77,24 @@ def test_publisher_without_source_times_is_never_late():
     assert [delay.of(Header(1, n, 0), n * 10.0) for n in range(1, 4)] == [0.0, 0.0, 0.0]
 
 
-def ages_of(mesh, robot: str) -> tuple[float, float, float]:
-    """Return the age of an immediate sample, then delay and age of one that waited 3 s."""
-
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
-            publisher = gateway.declare_publisher("site", robot, "joints")
-            subscription = monitor.subscribe(f"robomesh/site/{robot}/joints", newest=10, history=False)
-            while not publisher.watched:
-                await asyncio.sleep(0.01)
-            publisher.put(JointStates())
-            await anext(subscription)
-            immediate = subscription.age_s(publisher.key)
-            publisher.put(JointStates(), source_time_ns=time.time_ns() - 3 * S)
-            waited = await anext(subscription)
-            return immediate, waited.late_s, subscription.age_s(publisher.key)
-
-    return run(main())
-
-
-def test_sample_that_waited_on_its_way_is_old_on_arrival(mesh):
-    immediate, late, then = ages_of(mesh, "arm")
-    assert immediate >= 0.0
-    # Relative to the first sample, which also took some time.
-    assert late > 1.0
-    assert then >= late
-
-
-def test_replay_with_old_source_times_is_never_late(mesh):
-    _, late, _ = ages_of(mesh, "replay-1")
-    assert late == 0.0
+@pytest.mark.parametrize("robot", ["arm", "replay-1"])
+async def test_sample_that_waited_on_its_way_is_old_on_arrival_except_of_a_replay(mesh, robot):
+    async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+        publisher = gateway.declare_publisher("site", robot, "joints")
+        subscription = monitor.subscribe(f"robomesh/site/{robot}/joints", newest=10, history=False)
+        while not publisher.watched:
+            await asyncio.sleep(0.01)
+        publisher.put(JointStates())
+        await anext(subscription)
+        assert subscription.age_s(publisher.key) >= 0.0
+        publisher.put(JointStates(), source_time_ns=time.time_ns() - 3 * S)
+        waited = await anext(subscription)
+        if robot == "arm":
+            # Relative to the first sample, which also took some time.
+            assert waited.late_s > 1.0
+            assert subscription.age_s(publisher.key) >= waited.late_s
+        else:
+            assert waited.late_s == 0.0
 
 
 async def test_publisher_with_a_set_clock_takes_another_identity(mesh, monkeypatch):

@@ -22,7 +22,7 @@ from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import MOST_OF_ONE, name_of
 from robomesh.wire.session import SessionSettings, open_session
-from tests.conftest import free_port, put_unheard, run
+from tests.conftest import free_port, put_unheard
 from tests.protocol_gateway.gateway_site import until
 from tests.refusals import refused
 
@@ -477,12 +477,13 @@ with zenoh.open(router_config((sys.argv[1],))):
 
 
 @pytest.mark.processes
-def test_router_without_a_reply_is_not_taken_for_an_empty_mesh():
+async def test_router_without_a_reply_is_not_taken_for_an_empty_mesh():
     endpoint = f"tcp/127.0.0.1:{free_port()}"
-    command = [sys.executable, "-c", _ROUTER, endpoint]
-    router = subprocess.Popen(command, stdin=subprocess.PIPE, cwd=Path(__file__).parents[2])
-
-    async def main():
+    command = (sys.executable, "-c", _ROUTER, endpoint)
+    router = await asyncio.create_subprocess_exec(
+        *command, stdin=subprocess.PIPE, cwd=Path(__file__).parents[2]
+    )
+    try:
         async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
             assert await session.present() == []
             router.send_signal(signal.SIGSTOP)
@@ -491,11 +492,8 @@ def test_router_without_a_reply_is_not_taken_for_an_empty_mesh():
                     await session.present()
             finally:
                 router.send_signal(signal.SIGCONT)
-
-    try:
-        run(main())
     finally:
-        router.communicate()
+        await router.communicate(b"")
 
 
 async def test_session_that_watches_presence_still_lists_every_token(mesh):
@@ -587,23 +585,21 @@ async def test_session_waits_for_its_router_and_survives_its_restart():
     await asyncio.to_thread(router.close)
 
 
-def test_a_service_that_starts_while_its_router_reopens_answers_stops():
-    async def main():
-        endpoint = f"tcp/127.0.0.1:{free_port()}"
-        router = zenoh.open(router_config((endpoint,)))
-        async with open_session(SessionSettings(connect=(endpoint,), wait_s=10.0)) as gateway:
-            await asyncio.to_thread(router.close)
-            reopened = asyncio.ensure_future(asyncio.to_thread(reopen_after, 0.5, endpoint))
-            await asyncio.sleep(0.1)
-            gateway.answer("site", "arm", "stop", answer_lease)
-            router = await reopened
-        await asyncio.to_thread(router.close)
+async def test_a_service_that_starts_while_its_router_reopens_answers_stops():
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
 
-    def reopen_after(pause_s: float, endpoint: str) -> zenoh.Session:
-        time.sleep(pause_s)
+    def reopened() -> zenoh.Session:
+        time.sleep(0.5)
         return zenoh.open(router_config((endpoint,)))
 
-    run(main())
+    router = zenoh.open(router_config((endpoint,)))
+    async with open_session(SessionSettings(connect=(endpoint,), wait_s=10.0)) as gateway:
+        await asyncio.to_thread(router.close)
+        reopening = asyncio.create_task(asyncio.to_thread(reopened))
+        await asyncio.sleep(0.1)
+        gateway.answer("site", "arm", "stop", answer_lease)
+        router = await reopening
+    await asyncio.to_thread(router.close)
 
 
 async def test_missing_router_is_one_line_with_advice():

@@ -26,10 +26,6 @@ async def running(settings="settings", **options):
         await worker.close()
 
 
-def run(coroutine):
-    return asyncio.run(coroutine)
-
-
 @pytest.mark.slow
 async def test_worker_answers_in_its_process_and_keeps_it():
     async with running() as worker:
@@ -216,21 +212,17 @@ class Exploit:
 
 
 @pytest.mark.slow
-def test_untrusted_worker_cannot_run_code_in_its_parent_or_exhaust_its_memory(tmp_path):
+async def test_untrusted_worker_cannot_run_code_in_its_parent_or_exhaust_its_memory(tmp_path):
     exploit = pickle.dumps(("answer", Exploit(str(tmp_path / "written"))))
     length = struct.Struct("<Q")
-
-    async def main():
-        async with running(untrusted=True) as worker:
-            for data, problem in (
-                (length.pack(len(exploit)) + exploit, "its answer is invalid"),
-                (length.pack(1 << 40), "1099511627776 bytes"),
-                (length.pack(4) + b"true", "its answer is invalid"),
-            ):
-                with pytest.raises(WorkerError, match=problem):
-                    await worker.ask(("send", data), timeout_s=30)
-                assert worker.pid is None
-            assert (await worker.ask("hello", timeout_s=30))[2] == "hello"
-
-    run(main())
+    async with running(untrusted=True) as worker:
+        for data, problem in (
+            (length.pack(len(exploit)) + exploit, "its answer is invalid"),
+            (length.pack(1 << 40), "1099511627776 bytes"),
+            (length.pack(4) + b"true", "its answer is invalid"),
+        ):
+            with pytest.raises(WorkerError, match=problem):
+                await worker.ask(("send", data), timeout_s=30)
+            assert worker.pid is None
+        assert (await worker.ask("hello", timeout_s=30))[2] == "hello"
     assert list(tmp_path.iterdir()) == []

@@ -240,57 +240,10 @@ def test_what_is_no_recording_is_refused(tmp_path):
     assert refused.value.code == "recording.not_mcap"
 
 
-def _write(path, states):
-    """Write joint states in one compressed chunk."""
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=1 << 30, compression=CompressionType.ZSTD)
-        writer.start()
-        channel = writer.register_channel(
-            "robomesh/site/arm/joints", "protobuf", register_schema(writer, JointStatesMessage)
-        )
-        for number, state in enumerate(states):
-            writer.add_message(channel, START_NS + number, state.SerializeToString(), START_NS + number)
-        writer.finish()
-    return path
-
-
-def test_a_small_file_whose_states_lack_most_joints_does_not_fill_the_memory(tmp_path):
-    first = joints(**{f"j{number}": 0.0 for number in range(20_000)})
-    path = _write(tmp_path / "wide.mcap", [first, *[joints()] * 50_000])
-    tracemalloc.start()
-    try:
-        with pytest.raises(robomesh.RecordingError, match="too few joints in common"):
-            robomesh.open_recording(path).joints()
-        assert tracemalloc.get_traced_memory()[1] < 200 << 20
-    finally:
-        tracemalloc.stop()
-
-
-def test_a_small_file_that_unpacks_to_much_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_BYTES", 1 << 20)
-    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_TIMES_THE_FILE", 0)
-    path = _write(tmp_path / "long.mcap", [joints(waist=0.0, elbow=0.0)] * 60_000)
-    recording = robomesh.open_recording(path)
-    with pytest.raises(robomesh.RecordingError, match="one after the other"):
-        recording.joints()
-    assert sum(1 for _ in recording.messages("joints")) == 60_000
-
-
-def test_a_time_out_of_range_is_refused(tmp_path):
-    with (tmp_path / "late.mcap").open("wb") as stream:
-        writer = Writer(stream)
-        writer.start()
-        channel = writer.register_channel("joints", "protobuf", register_schema(writer, JointStatesMessage))
-        writer.add_message(channel, START_NS, joints(waist=1).SerializeToString(), (1 << 64) - 1)
-        writer.finish()
-    with pytest.raises(robomesh.RecordingError, match="a time out of range"):
-        robomesh.open_recording(tmp_path / "late.mcap").joints()
-
-
-def _file(path, fill):
+def _file(path, fill, *, chunk_size=1 << 20):
     """Write a file with one channel of joints, as `fill(writer, channel)` does."""
     with path.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer = Writer(stream, chunk_size=chunk_size, compression=CompressionType.ZSTD)
         writer.start()
         schema_id = register_schema(writer, JointStatesMessage)
         fill(writer, writer.register_channel("robomesh/site/arm/joints", "protobuf", schema_id))
@@ -304,12 +257,46 @@ def _put(writer, channel, messages):
         writer.add_message(channel, START_NS + number, data, START_NS + number)
 
 
+def _write(path, states, **options):
+    return _file(path, lambda writer, channel: _put(writer, channel, states), **options)
+
+
+def test_a_small_file_whose_states_lack_most_joints_does_not_fill_the_memory(tmp_path):
+    first = joints(**{f"j{number}": 0.0 for number in range(20_000)})
+    path = _write(tmp_path / "wide.mcap", [first, *[joints()] * 50_000], chunk_size=1 << 30)
+    tracemalloc.start()
+    try:
+        with pytest.raises(robomesh.RecordingError, match="too few joints in common"):
+            robomesh.open_recording(path).joints()
+        assert tracemalloc.get_traced_memory()[1] < 200 << 20
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_small_file_that_unpacks_to_much_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_BYTES", 1 << 20)
+    monkeypatch.setattr("robomesh.client.recordings.recording._MOST_TIMES_THE_FILE", 0)
+    path = _write(tmp_path / "long.mcap", [joints(waist=0.0, elbow=0.0)] * 60_000, chunk_size=1 << 30)
+    recording = robomesh.open_recording(path)
+    with pytest.raises(robomesh.RecordingError, match="one after the other"):
+        recording.joints()
+    assert sum(1 for _ in recording.messages("joints")) == 60_000
+
+
+def test_a_time_out_of_range_is_refused(tmp_path):
+    def fill(writer, channel):
+        writer.add_message(channel, START_NS, joints(waist=1).SerializeToString(), (1 << 64) - 1)
+
+    with pytest.raises(robomesh.RecordingError, match="a time out of range"):
+        robomesh.open_recording(_file(tmp_path / "late.mcap", fill)).joints()
+
+
 def test_states_may_name_no_joints_further_joints_and_one_name_twice(tmp_path):
     twice = JointStatesMessage()
     for position in (7, 8):
         twice.joints.add(name="waist", position=position)
     states = [JointStatesMessage(), joints(waist=1, lift=2), joints(lift=20, waist=10), joints(tool=3), twice]
-    path = _file(tmp_path / "mixed.mcap", lambda writer, channel: _put(writer, channel, states))
+    path = _write(tmp_path / "mixed.mcap", states)
     found = robomesh.open_recording(path).joints()
     assert found.names == ("waist", "lift", "tool", "waist")
     nan = float("nan")
@@ -378,7 +365,7 @@ def test_what_a_summary_lists_many_times_is_read_once(tmp_path, monkeypatch):
 def test_a_small_file_whose_chunks_unpack_to_much_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("robomesh.recordings.records._MOST_UNPACKED_BYTES", 1 << 20)
     monkeypatch.setattr("robomesh.recordings.records._MOST_TIMES_THE_FILE", 0)
-    path = _file(tmp_path / "bomb.mcap", lambda writer, channel: _put(writer, channel, [bytes(1 << 20)] * 2))
+    path = _write(tmp_path / "bomb.mcap", [bytes(1 << 20)] * 2)
     for keep in (None, -100):  # with and without a summary
         (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:keep])
         with pytest.raises(robomesh.RecordingError, match="unpack to"):
@@ -389,7 +376,7 @@ def test_a_small_file_whose_chunks_unpack_to_much_is_refused(tmp_path, monkeypat
 
 def test_many_messages_of_a_small_chunk_do_not_wait_in_memory(tmp_path, monkeypatch):
     monkeypatch.setattr("robomesh.recordings.reading._MOST_WAITING_BYTES", 1 << 20)
-    path = _file(tmp_path / "many.mcap", lambda writer, channel: _put(writer, channel, [b""] * 100_000))
+    path = _write(tmp_path / "many.mcap", [b""] * 100_000)
     with path.open("rb") as stream:  # by the format's own reader it is valid
         assert make_reader(stream).get_summary().statistics.message_count == 100_000
     with RecordingFile(path) as file:
@@ -419,14 +406,14 @@ def test_long_metadata_of_another_program_is_not_kept(tmp_path):
 def test_messages_without_bytes_count_too(tmp_path, monkeypatch):
     monkeypatch.setattr("robomesh.client.recordings.recording._MOST_BYTES", 10_000)
     monkeypatch.setattr("robomesh.client.recordings.recording._MOST_TIMES_THE_FILE", 0)
-    path = _file(tmp_path / "empty.mcap", lambda writer, channel: _put(writer, channel, [b""] * 1000))
+    path = _write(tmp_path / "empty.mcap", [b""] * 1000)
     with pytest.raises(robomesh.RecordingError, match="one after the other"):
         robomesh.open_recording(path).joints()
 
 
 def test_long_messages_are_not_all_in_memory(tmp_path):
     state = joints(**{"n" * (1 << 20): 1.0})
-    path = _file(tmp_path / "long.mcap", lambda writer, channel: _put(writer, channel, [state] * 200))
+    path = _write(tmp_path / "long.mcap", [state] * 200)
     recording = robomesh.open_recording(path)
     tracemalloc.start()
     try:
