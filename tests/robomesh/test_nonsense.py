@@ -110,3 +110,20 @@ async def test_request_longer_than_its_row_permits_is_not_decoded_but_a_stop_sto
             assert why in await asyncio.to_thread(text, key, payload)
         await asyncio.to_thread(text, STOP.format("arm"), b'{"by":"' + b"x" * 300_000 + b'"}')
         assert seen[-1] == schema.StopRequest()
+
+
+async def test_request_on_a_key_that_is_too_long_is_refused(mesh, plain):
+    refused = []
+
+    async def answer(request):
+        raise AssertionError("a command on an invalid key was handled")
+
+    async with open_session(mesh) as gateway:
+        gateway.answer("site", "arm", "command/*", answer, on_refused=lambda *why: refused.append(why))
+        name, replies = "x" * 1100, []
+        key = f"robomesh/site/arm/command/{name}"
+        while not replies:  # until the router knows the server
+            replies = await asyncio.to_thread(lambda: list(plain.get(key, timeout=20.0)))
+        assert "code=request.invalid" in str(replies[0].err.encoding)
+        assert {(chunk, reason.code) for chunk, reason in refused} == {(name, "request.invalid")}
+        assert gateway.ignored.count == len(refused)
