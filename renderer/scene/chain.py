@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import ChainError
+from robots.descriptions.urdf.values import WrongElement, numbers, origin
+from robots.schema.poses import axis_rotation
 
 FloatArray = NDArray[np.float64]
 
@@ -49,7 +51,7 @@ def read_chain(urdf: str) -> Chain:
         robot = ElementTree.fromstring(urdf)
         waiting = [_joint(element) for element in robot.findall("joint")]
         links = [link.attrib["name"] for link in robot.findall("link")]
-    except (ElementTree.ParseError, KeyError, ValueError) as error:
+    except (ElementTree.ParseError, WrongElement, KeyError, ValueError) as error:
         raise ChainError(f"the description's URDF cannot be read: {error!r}") from None
     children = {joint.child for joint in waiting}
     roots = [link for link in links if link not in children]
@@ -102,18 +104,17 @@ def reach(chain: Chain, points: Mapping[str, FloatArray]) -> FloatArray:
 
 
 def _joint(element: ElementTree.Element) -> ChainJoint:
+    name, kind = element.attrib["name"], element.attrib["type"]
     limit = element.find("limit")
     bounds = limit.attrib if limit is not None else {}
-    axis = element.find("axis")
-    kind = element.attrib["type"]
     full_turn = np.pi if kind == "continuous" else 0.0
     return ChainJoint(
-        name=element.attrib["name"],
+        name=name,
         kind=kind,
         parent=_link(element, "parent"),
         child=_link(element, "child"),
-        origin=_origin(element.find("origin")),
-        axis=_numbers(axis.attrib.get("xyz", "1 0 0") if axis is not None else "1 0 0"),
+        origin=origin(element, f"joint {name!r}"),
+        axis=np.array(numbers(element.find("axis"), "xyz", 3, f"joint {name!r} axis", "1 0 0")),
         lower=float(bounds.get("lower", -full_turn)),
         upper=float(bounds.get("upper", full_turn)),
     )
@@ -126,37 +127,11 @@ def _link(element: ElementTree.Element, end: str) -> str:
     return child.attrib["link"]
 
 
-def _origin(element: ElementTree.Element | None) -> FloatArray:
-    placement = np.eye(4)
-    if element is not None:
-        roll, pitch, yaw = _numbers(element.attrib.get("rpy", "0 0 0"))
-        z, y, x = np.eye(3)[::-1]
-        placement[:3, :3] = rotation(z, yaw) @ rotation(y, pitch) @ rotation(x, roll)
-        placement[:3, 3] = _numbers(element.attrib.get("xyz", "0 0 0"))
-    return placement
-
-
-def _numbers(text: str) -> FloatArray:
-    values = np.array([float(part) for part in text.split()])
-    if len(values) != 3:
-        raise ValueError(f"{text!r} is not three numbers")
-    return values
-
-
 def _motion(joint: ChainJoint, position: FloatArray) -> FloatArray:
     """Return the (..., 4, 4) motion of a joint at its positions, relative to its origin."""
     motion = np.tile(np.eye(4), (*position.shape, 1, 1))
     if joint.kind in ("revolute", "continuous"):
-        motion[..., :3, :3] = rotation(joint.axis, position)
+        motion[..., :3, :3] = axis_rotation(joint.axis, position)
     elif joint.kind == "prismatic":
         motion[..., :3, 3] = joint.axis * position[..., None]
     return motion
-
-
-def rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
-    """Return (..., 3, 3) rotations about a unit axis by angles [rad] (Rodrigues)."""
-    x, y, z = axis
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
-    matrix: FloatArray = np.eye(3) + sine * across + (1.0 - cosine) * (across @ across)
-    return matrix

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.shapes.normals import crease_normals
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -31,39 +33,19 @@ def face_vectors(positions: FloatArray, triangles: IntArray) -> FloatArray:
     return vectors
 
 
-def crease_normals(positions: FloatArray, triangles: IntArray, *, crease: float = CREASE) -> FloatArray:
+def corner_normals(positions: FloatArray, triangles: IntArray) -> FloatArray:
     """Return the (t, 3, 3) normal of each corner: the mean over adjacent faces that no crease separates.
 
     Args:
         positions: (v, 3), welded.
         triangles: (t, 3).
-        crease: Angle between two faces from which their edge is sharp [rad].
     """
+    owners = np.repeat(np.arange(len(triangles)), 3)
     vectors = face_vectors(positions, triangles)
-    unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    corners = triangles.reshape(-1)
-    order = np.argsort(corners, kind="stable")
-    face_of = order // 3
-    counts = np.bincount(corners, minlength=len(positions))
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    # All pairs (corner, face at the same vertex) in one array.
-    sizes = counts[corners[order]]
-    mine = np.repeat(np.arange(len(order)), sizes)
-    ends = np.cumsum(sizes)
-    within = np.arange(len(mine)) - np.repeat(ends - sizes, sizes)
-    others = face_of[starts[corners[order]][mine] + within]
-    together = (unit[face_of[mine]] * unit[others]).sum(axis=1) > np.cos(crease)
-    sums = np.zeros((len(order), 3))
-    for axis in range(3):
-        sums[:, axis] = np.bincount(
-            mine[together], weights=vectors[others[together], axis], minlength=len(order)
-        )
-    normals = np.empty_like(sums)
-    normals[order] = sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-20)
-    return normals.reshape(-1, 3, 3)
+    return crease_normals(triangles.ravel(), owners, vectors, CREASE).reshape(-1, 3, 3)
 
 
-def sharp_edges(positions: FloatArray, triangles: IntArray, *, crease: float = CREASE) -> FloatArray:
+def sharp_edges(positions: FloatArray, triangles: IntArray) -> FloatArray:
     """Return the (e, 2, 3) ends of the sharp edges."""
     vectors = face_vectors(positions, triangles)
     unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -73,6 +55,6 @@ def sharp_edges(positions: FloatArray, triangles: IntArray, *, crease: float = C
     order = np.lexsort((keys[:, 1], keys[:, 0]))
     keys, faces = keys[order], faces[order]
     pair = np.nonzero((keys[1:] == keys[:-1]).all(axis=1))[0]
-    sharp = (unit[faces[pair]] * unit[faces[pair + 1]]).sum(axis=1) < np.cos(crease)
+    sharp = (unit[faces[pair]] * unit[faces[pair + 1]]).sum(axis=1) < np.cos(CREASE)
     ends: FloatArray = positions[keys[pair[sharp]]]
     return ends

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import GlbError
-from renderer.shapes.creases import FloatArray, IntArray, crease_normals, sharp_edges, weld
+from renderer.shapes.creases import FloatArray, IntArray, corner_normals, sharp_edges, weld
 from renderer.shapes.occlusion import open_sky
 from renderer.shapes.simplification import simplified
 from renderer.shapes.vertex_light import SCALES, ordered
@@ -162,7 +162,7 @@ class _Body:
         if untouched and surface.normals is not None:
             normals = surface.normals[surface.indices]
         else:
-            normals = crease_normals(positions, triangles)
+            normals = corner_normals(positions, triangles)
         return cls(
             positions=positions,
             triangles=triangles,

@@ -88,13 +88,6 @@ def placed_boxes(bounds: Bounds, placements: FloatArray) -> Boxes:
     return Boxes(centers, axes, bounds.halves)
 
 
-def box_about(boxes: Boxes) -> Boxes:
-    """Return the bounding box of all boxes, along the site's axes."""
-    reach = np.einsum("bij,bj->bi", np.abs(boxes.axes), boxes.halves)
-    low, high = (boxes.centers - reach).min(axis=0), (boxes.centers + reach).max(axis=0)
-    return Boxes(((low + high) / 2)[None], np.eye(3)[None], ((high - low) / 2)[None])
-
-
 @dataclass(frozen=True, eq=False)
 class Balls:
     """Balls that cover bodies, in the frames of their links [m].

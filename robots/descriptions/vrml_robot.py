@@ -22,8 +22,7 @@ from robots.shapes.files.vrml.drawing import Drawing
 from robots.shapes.files.vrml.files import Files
 from robots.shapes.files.vrml.parser import MAX_DEPTH, Node
 from robots.shapes.files.vrml.protos import found_proto, instance
-from robots.shapes.files.vrml.transform import transform_matrix
-from robots.shapes.files.vrml.values import nodes_of, number, numbers, strings
+from robots.shapes.files.vrml.values import nodes_of, number, numbers, strings, transform_matrix
 from robots.shapes.geometry import Geometry
 
 _TYPES = {

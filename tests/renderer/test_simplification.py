@@ -8,7 +8,7 @@ import pytest
 from renderer.drawing import level_of_detail
 from renderer.drawing.level_of_detail import next_level
 from renderer.shapes import prepare
-from renderer.shapes.creases import crease_normals
+from renderer.shapes.creases import corner_normals
 from renderer.shapes.prepare import prepared
 from renderer.shapes.simplification import simplified
 from tests.renderer.bodies import ball, context_or_skip, cube, glb
@@ -34,7 +34,7 @@ def area(positions, triangles):
 def test_an_open_plate_loses_triangles_but_not_its_border():
     positions, triangles = plate(20)
     points, faces, values = simplified(
-        positions, triangles, crease_normals(positions, triangles), error=0.001
+        positions, triangles, corner_normals(positions, triangles), error=0.001
     )
     assert len(faces) < len(triangles) / 4
     assert area(points, faces) == pytest.approx(1.0)
@@ -44,7 +44,7 @@ def test_an_open_plate_loses_triangles_but_not_its_border():
 def test_corners_keep_the_values_of_their_own_side_of_an_edge():
     positions, triangles = plate(20)
     positions = np.where(positions[:, :1] > 0.5, positions + (positions[:, :1] - 0.5) * [-1, 0, 1], positions)
-    normals = crease_normals(positions, triangles)  # flat, then upright along the line x = 0.5
+    normals = corner_normals(positions, triangles)  # flat, then upright along the line x = 0.5
     sides = (normals[..., 0] < -0.5)[..., None].astype(float)
     points, faces, values = simplified(
         positions, triangles, np.concatenate([normals, sides], axis=2), error=0.001

@@ -14,8 +14,7 @@ from robots.shapes.files.vrml.geometry import GEOMETRY
 from robots.shapes.files.vrml.lines import STROKES, Strokes
 from robots.shapes.files.vrml.parser import MAX_DEPTH, Node
 from robots.shapes.files.vrml.protos import node_of, resolved
-from robots.shapes.files.vrml.transform import transform_matrix
-from robots.shapes.files.vrml.values import color, nodes_of, number, strings
+from robots.shapes.files.vrml.values import color, nodes_of, number, strings, transform_matrix
 from robots.shapes.geometry import Color, FloatArray, Material, Part, Wire, placed, transformed
 
 # A few nested USEs can expand to billions of nodes.

@@ -7,8 +7,7 @@ import numpy as np
 
 from robots.shapes.faces import Faces
 from robots.shapes.files.vrml.parser import Node
-from robots.shapes.files.vrml.transform import rotations
-from robots.shapes.files.vrml.values import flag, number, rows
+from robots.shapes.files.vrml.values import flag, number, rotations, rows
 from robots.shapes.geometry import FloatArray, unit
 from robots.shapes.polygons import cross
 
