@@ -1,1 +1,4 @@
-"""Robot descriptions, D-H rows, shapes, kinematics, collision checks, URDF and GLB."""
+"""Everything about a robot that needs no network: description, shapes, kinematics, collisions, programs, checks.
+
+No session, no controller and no picture.
+"""

@@ -1,4 +1,4 @@
 """One picture from a robot's state and a requested view: composition, texts, lines, encoded result.
 
-No time-table and no topics (`streams`).
+No topics, and nothing that decides when to draw (`service`).
 """

@@ -1,4 +1,6 @@
-"""Teach programs: text, motion plan, and the check of a motion before it is executed.
+"""Teach programs: their text, their statements, curves from DXF, and the plan of their motion.
+
+A program's check belongs to `checks`.
 
 This file imports nothing, so a process that only forwards steps or stores texts needs no coal and no
 Pinocchio.
