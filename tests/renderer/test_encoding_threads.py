@@ -5,7 +5,6 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 from renderer.service.encoding_threads import EncodingThread, EncodingThreads, thread_count
-from tests.conftest import run
 
 
 class Encoders:
@@ -39,47 +38,39 @@ def test_streams_are_spread_and_keep_their_thread():
     assert sorted(ended) == ["end b", "end c", "end d"]
 
 
-def test_pictures_of_a_thread_are_in_order_and_those_of_another_do_not_wait():
+async def test_pictures_of_a_thread_are_in_order_and_those_of_another_do_not_wait():
     allowed = threading.Event()
     slow, fast = Encoders(allowed), Encoders()
-
-    async def main():
-        with ThreadPoolExecutor(1, "slow") as first, ThreadPoolExecutor(1, "fast") as second:
-            threads = EncodingThreads([EncodingThread(first, slow), EncodingThread(second, fast)])
-            a, b = threads.of("a"), threads.of("b")
-            await a.start(a.process(None, None, 1))
-            waiting = asyncio.create_task(a.start(a.process(None, None, 2)))
-            for number in range(3):
-                await b.start(b.process(None, None, number))
-            await b.start(b.process(None, None, 3))
-            assert not waiting.done()
-            allowed.set()
-            await waiting
-            await a.start(a.process(None, None, 3))
-            for thread in (a, b):
-                await thread.start(asyncio.sleep(0))
-
-    run(main())
+    with ThreadPoolExecutor(1, "slow") as first, ThreadPoolExecutor(1, "fast") as second:
+        threads = EncodingThreads([EncodingThread(first, slow), EncodingThread(second, fast)])
+        a, b = threads.of("a"), threads.of("b")
+        await a.start(a.process(None, None, 1))
+        waiting = asyncio.create_task(a.start(a.process(None, None, 2)))
+        for number in range(3):
+            await b.start(b.process(None, None, number))
+        await b.start(b.process(None, None, 3))
+        assert not waiting.done()
+        allowed.set()
+        await waiting
+        await a.start(a.process(None, None, 3))
+        for thread in (a, b):
+            await thread.start(asyncio.sleep(0))
     assert [job for job, _ in slow.calls] == [1, 2, 3]
     assert [job for job, _ in fast.calls] == [0, 1, 2, 3]
     assert {name.partition("_")[0] for _, name in slow.calls} == {"slow"}
 
 
-def test_a_picture_that_waits_is_dropped_with_its_task():
+async def test_a_picture_that_waits_is_dropped_with_its_task():
     allowed = threading.Event()
     encoders = Encoders(allowed)
-
-    async def main():
-        with ThreadPoolExecutor(1) as executor:
-            thread = EncodingThread(executor, encoders)
-            await thread.start(thread.process(None, None, 1))
-            waiting = asyncio.create_task(thread.start(thread.process(None, None, 2)))
-            await asyncio.sleep(0)
-            waiting.cancel()
-            await asyncio.gather(waiting, return_exceptions=True)
-            allowed.set()
-
-    run(main())
+    with ThreadPoolExecutor(1) as executor:
+        thread = EncodingThread(executor, encoders)
+        await thread.start(thread.process(None, None, 1))
+        waiting = asyncio.create_task(thread.start(thread.process(None, None, 2)))
+        await asyncio.sleep(0)
+        waiting.cancel()
+        await asyncio.gather(waiting, return_exceptions=True)
+        allowed.set()
     assert 2 not in [job for job, _ in encoders.calls]
 
 
