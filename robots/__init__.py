@@ -1,4 +1,4 @@
-"""Everything about a robot that needs no network: description, shapes, kinematics, collisions, programs, checks.
+"""All about a robot that needs no network: descriptions, shapes, kinematics, collisions, programs, checks.
 
 No session, no controller and no picture.
 """

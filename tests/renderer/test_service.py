@@ -26,7 +26,7 @@ from robots.descriptions.cells import Fixture
 from services.site_file.tables.fixtures import Fixture as FixtureRow
 from services.site_file.tables.fixtures import fixture_shape
 from tests.cells import single_arm
-from tests.conftest import last_value, run
+from tests.conftest import last_value
 from tests.refusals import refused
 from tests.renderer.renderer_site import (
     HOME,
