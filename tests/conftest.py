@@ -45,7 +45,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     if not inspect.iscoroutinefunction(pyfuncitem.obj):
         return None
     arguments = inspect.signature(pyfuncitem.obj).parameters
-    run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in arguments}))
+    run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in arguments}), timeout_s=240.0)
     return True
 
 

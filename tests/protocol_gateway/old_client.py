@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import functools
 
 from protocol_gateway.core.records import AbsolutePositions, Error, Status
 from protocol_gateway.core.stream import Malformed, UnitStream
@@ -11,16 +10,6 @@ from tests.conftest import free_port
 from tests.protocol_gateway.gateway_site import gateway, simulator, until
 
 ME = "127.0.0.1"
-
-
-def in_loop(test):
-    """Run a coroutine test in a new event loop."""
-
-    @functools.wraps(test)
-    def run(*args, **fixtures):
-        asyncio.run(test(*args, **fixtures))
-
-    return run
 
 
 def legacy(**settings):

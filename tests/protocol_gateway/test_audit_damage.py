@@ -205,7 +205,7 @@ async def test_a_damaged_log_stops_the_robot_until_a_reset(mesh, tmp_path):
 
 async def test_a_read_only_robot_shows_no_stop_but_its_log_keeps_it(mesh, tmp_path):
     live = tmp_path / "hall" / "arm.jsonl"
-    write(live, *STOPPED)
+    await asyncio.to_thread(write, live, *STOPPED)
     changed(1)(live)
     async with simulator() as port:
         async with gateway(mesh, tmp_path, port, stop_proven=False) as site:

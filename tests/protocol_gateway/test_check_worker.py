@@ -19,7 +19,6 @@ from robots.descriptions.cells import CellDescription, CellRobot, Fixture
 from robots.kinematics.kinematic_tree import Shape
 from robots.schema.robot_toml import JointSettings, StatedModel
 from robots.shapes.geometry import Geometry, Material, Part
-from tests.conftest import run
 from tests.robots.boxes import bar_arm, block, one_joint_arm, placed
 
 STANDING = (0.0, 0.0)
@@ -74,74 +73,64 @@ def test_robots_of_a_cell_share_a_process_and_single_robots_share_one():
 
 
 @pytest.mark.slow
-def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
-    async def main():
-        checker = Checker({"arm": one_robot_cell("arm", bar_arm(tmp_path))}, start_now=True)
-        begun = []
-        ask = checker._worker.ask
+async def test_a_query_is_not_started_after_its_timeout(tmp_path, monkeypatch):
+    checker = Checker({"arm": one_robot_cell("arm", bar_arm(tmp_path))}, start_now=True)
+    begun = []
+    ask = checker._worker.ask
 
-        async def counted(question, *, timeout_s):
-            begun.append(question)
-            return await ask(question, timeout_s=timeout_s)
+    async def counted(question, *, timeout_s):
+        begun.append(question)
+        return await ask(question, timeout_s=timeout_s)
 
-        monkeypatch.setattr(checker._worker, "ask", counted)
-        async with running(checker):
-            await ready(checker, "arm")
-            begun.clear()
-            os.kill(checker.pid, signal.SIGSTOP)
-            late = await asyncio.gather(
-                *(checker.motion(motion("arm"), timeout_s=0.2) for _ in range(20)), return_exceptions=True
-            )
-            assert all(isinstance(each, CheckError) and "longer than" in str(each) for each in late)
-            os.kill(checker.pid, signal.SIGCONT)
-            assert isinstance(await checker.motion(motion("arm"), timeout_s=30.0), Checked)
-            # The query that hung, and the one that waited.
-            assert len(begun) == 2
-
-    run(main(), timeout_s=90)
+    monkeypatch.setattr(checker._worker, "ask", counted)
+    async with running(checker):
+        await ready(checker, "arm")
+        begun.clear()
+        os.kill(checker.pid, signal.SIGSTOP)
+        late = await asyncio.gather(
+            *(checker.motion(motion("arm"), timeout_s=0.2) for _ in range(20)), return_exceptions=True
+        )
+        assert all(isinstance(each, CheckError) and "longer than" in str(each) for each in late)
+        os.kill(checker.pid, signal.SIGCONT)
+        assert isinstance(await checker.motion(motion("arm"), timeout_s=30.0), Checked)
+        # The query that hung, and the one that waited.
+        assert len(begun) == 2
 
 
 @pytest.mark.slow
-def test_a_worker_that_is_killed_while_idle_is_prepared_again_before_the_next_motion(tmp_path):
-    async def main():
-        checker = Checker({"arm": one_robot_cell("arm", bar_arm(tmp_path))}, start_now=True)
-        async with running(checker):
-            await ready(checker, "arm")
-            first = checker.pid
-            os.kill(first, signal.SIGKILL)
-            async with asyncio.timeout(60):
-                while checker.pid in (first, None):
-                    await asyncio.sleep(0.02)
-            await ready(checker, "arm")
-            assert isinstance(await checker.motion(motion("arm"), timeout_s=30.0), Checked)
-
-    run(main(), timeout_s=90)
+async def test_a_worker_that_is_killed_while_idle_is_prepared_again_before_the_next_motion(tmp_path):
+    checker = Checker({"arm": one_robot_cell("arm", bar_arm(tmp_path))}, start_now=True)
+    async with running(checker):
+        await ready(checker, "arm")
+        first = checker.pid
+        os.kill(first, signal.SIGKILL)
+        async with asyncio.timeout(60):
+            while checker.pid in (first, None):
+                await asyncio.sleep(0.02)
+        await ready(checker, "arm")
+        assert isinstance(await checker.motion(motion("arm"), timeout_s=30.0), Checked)
 
 
 @pytest.mark.slow
-def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
+async def test_an_unexpected_error_is_reported_and_the_worker_goes_on(tmp_path):
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
     faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3]])
     shape = Shape(Geometry(parts=(Part("", Material(), corners, np.zeros_like(corners), faces),)), np.eye(4))
     model = bar_arm(tmp_path)
-
-    async def main():
-        cells = {
-            "bad": one_robot_cell("bad", model, Fixture("odd", (shape,), np.eye(4))),
-            "good": one_robot_cell("good", model),
-        }
-        checker = Checker(cells, start_now=True)
-        async with running(checker) as task:
-            await ready(checker, "good")
-            assert "LinAlgError" in checker.problem("bad").text
-            with pytest.raises(CheckError, match="LinAlgError"):
-                await checker.motion(motion("bad"), timeout_s=30.0)
-            # A robot that is not in the cell: a bug of the caller.
-            with pytest.raises(CheckError, match="the check failed: KeyError: 'nobody'"):
-                await checker.motion(motion("good", others={"nobody": (STANDING,)}), timeout_s=30.0)
-            assert not task.done()
-
-    run(main(), timeout_s=90)
+    cells = {
+        "bad": one_robot_cell("bad", model, Fixture("odd", (shape,), np.eye(4))),
+        "good": one_robot_cell("good", model),
+    }
+    checker = Checker(cells, start_now=True)
+    async with running(checker) as task:
+        await ready(checker, "good")
+        assert "LinAlgError" in checker.problem("bad").text
+        with pytest.raises(CheckError, match="LinAlgError"):
+            await checker.motion(motion("bad"), timeout_s=30.0)
+        # A robot that is not in the cell: a bug of the caller.
+        with pytest.raises(CheckError, match="the check failed: KeyError: 'nobody'"):
+            await checker.motion(motion("good", others={"nobody": (STANDING,)}), timeout_s=30.0)
+        assert not task.done()
 
 
 def test_another_robot_without_shapes_or_meshes_is_refused(tmp_path):

@@ -82,127 +82,110 @@ async def standing(site, target):
     await until(lambda: site.controller.activity == STATE.IDLE)
 
 
-def test_required_a_collision_is_refused_without_motion(mesh, tmp_path):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
-        ):
-            assert site.controller.check == STATE.REQUIRE
-            await checked(site)
-            before, units = list(site.joints), site.controller.counters.units_sent
-            text = await refusal(move(site, INTO_POST))
-            assert "post" in text
-            assert "arm/" in text
-            entry = await until(
-                lambda: next((each for each in site.seen["audit"] if "post" in each.text), None)
-            )
-            assert (entry.request, entry.outcome) == ("MOVE_ABSOLUTE", schema.AuditEntry.REFUSED)
-            await move(site, AWAY)
-            await until(lambda: site.joints[0] < before[0] - 0.1)
-            assert site.controller.counters.units_sent <= units + 1
-            text = await refusal(move(site, [0, 0, 0, 0, 0]))
-            assert "wait until it has stopped" in text
-
-    run(main(), timeout_s=90)
+async def test_required_a_collision_is_refused_without_motion(mesh, tmp_path):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
+    ):
+        assert site.controller.check == STATE.REQUIRE
+        await checked(site)
+        before, units = list(site.joints), site.controller.counters.units_sent
+        text = await refusal(move(site, INTO_POST))
+        assert "post" in text
+        assert "arm/" in text
+        entry = await until(lambda: next((each for each in site.seen["audit"] if "post" in each.text), None))
+        assert (entry.request, entry.outcome) == ("MOVE_ABSOLUTE", schema.AuditEntry.REFUSED)
+        await move(site, AWAY)
+        await until(lambda: site.joints[0] < before[0] - 0.1)
+        assert site.controller.counters.units_sent <= units + 1
+        text = await refusal(move(site, [0, 0, 0, 0, 0]))
+        assert "wait until it has stopped" in text
 
 
-def test_required_a_motion_below_the_floor_is_refused(mesh, tmp_path):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell()) as site,
-        ):
-            await checked(site)
-            text = await refusal(move(site, [0, 0, radians(-60), 0, 0]))
-            assert "mm below the floor" in text
-            await move(site, AWAY)
-
-    run(main(), timeout_s=120)
+async def test_required_a_motion_below_the_floor_is_refused(mesh, tmp_path):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell()) as site,
+    ):
+        await checked(site)
+        text = await refusal(move(site, [0, 0, radians(-60), 0, 0]))
+        assert "mm below the floor" in text
+        await move(site, AWAY)
 
 
-def test_warned_a_collision_is_sent_with_a_warning(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port, check="warn", cell=one_robot_cell(POST)) as site,
-        ):
-            assert site.controller.check == STATE.WARN
-            await checked(site)
-            answer = await move(site, INTO_POST)
-            assert answer.accepted
-            assert "post" in answer.text
-            event = (await until(lambda: site.events("check.failed")))[0]
-            assert event.severity == schema.Event.WARNING
-            assert "post" in event.text
-            await until(lambda: site.joints[0] > 0.1)
-
-    run(main(), timeout_s=90)
+async def test_warned_a_collision_is_sent_with_a_warning(mesh, tmp_path, monkeypatch):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port, check="warn", cell=one_robot_cell(POST)) as site,
+    ):
+        assert site.controller.check == STATE.WARN
+        await checked(site)
+        answer = await move(site, INTO_POST)
+        assert answer.accepted
+        assert "post" in answer.text
+        event = (await until(lambda: site.events("check.failed")))[0]
+        assert event.severity == schema.Event.WARNING
+        assert "post" in event.text
+        await until(lambda: site.joints[0] > 0.1)
 
 
-def test_required_motion_waits_for_a_killed_worker(mesh, tmp_path):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
-        ):
-            await checked(site)
-            os.kill(worker_of(os.getpid()), signal.SIGKILL)
-            (answer,) = await asyncio.gather(move(site, AWAY), return_exceptions=True)
-            # On a busy machine another worker may be there in time.
-            if isinstance(answer, Exception):
-                assert 'check = "require"' in str(answer)
-                assert site.controller.counters.units_sent == 1
-            async with asyncio.timeout(60):
-                while site.joints[0] > -0.1:
-                    await site.lease(A.RENEW, ttl_s=5)
-                    with contextlib.suppress(RefusedError):
-                        await move(site, AWAY)
-                    await asyncio.sleep(0.1)
-
-    run(main(), timeout_s=120)
-
-
-def test_required_motion_waits_for_a_busy_check_until_its_deadline_and_stops_do_not(mesh, tmp_path):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(), check_within_s=4.0) as site,
-        ):
-            await checked(site)
-            worker = worker_of(os.getpid())
-            async with kept_control(site):
-                os.kill(worker, signal.SIGSTOP)
-                first = asyncio.create_task(site.command(C.MOVE_ABSOLUTE, joint_positions=AWAY))
-                await asyncio.sleep(1.3)
-                assert not first.done()
-                os.kill(worker, signal.SIGCONT)
-                assert (await first).accepted
-                await standing(site, AWAY)
-
-                os.kill(worker, signal.SIGSTOP)
-                text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=OUT, not_after=after(1.5)))
-                assert "takes longer than 1." in text
-                # Without a deadline.
-                site.id += 1
-                request = schema.CommandRequest(
-                    command=C.MOVE_ABSOLUTE, joint_positions=OUT, lease=site.secret, id=site.id
-                )
-                begun_s = time.monotonic()
-                (reply,) = await asyncio.to_thread(raw, site, request)
-                assert "longer than 0.8 s" in str(reply.err.payload)
-                assert time.monotonic() - begun_s < 3.5, "it would have waited for 4 s with a deadline"
-
-                held = asyncio.create_task(site.command(C.MOVE_ABSOLUTE, joint_positions=OUT))
+async def test_required_motion_waits_for_a_killed_worker(mesh, tmp_path):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(POST)) as site,
+    ):
+        await checked(site)
+        os.kill(worker_of(os.getpid()), signal.SIGKILL)
+        (answer,) = await asyncio.gather(move(site, AWAY), return_exceptions=True)
+        # On a busy machine another worker may be there in time.
+        if isinstance(answer, Exception):
+            assert 'check = "require"' in str(answer)
+            assert site.controller.counters.units_sent == 1
+        async with asyncio.timeout(60):
+            while site.joints[0] > -0.1:
+                await site.lease(A.RENEW, ttl_s=5)
+                with contextlib.suppress(RefusedError):
+                    await move(site, AWAY)
                 await asyncio.sleep(0.1)
-                await site.command(C.HOLD)
-                await site.stop(reason="look")
-                assert not held.done()
-                os.kill(worker, signal.SIGCONT)
-                await refusal(held)
-            assert np.allclose(site.joints, AWAY, atol=1e-3)
 
-    run(main(), timeout_s=120)
+
+async def test_required_motion_waits_for_a_busy_check_until_its_deadline_and_stops_do_not(mesh, tmp_path):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port, check="require", cell=one_robot_cell(), check_within_s=4.0) as site,
+    ):
+        await checked(site)
+        worker = worker_of(os.getpid())
+        async with kept_control(site):
+            os.kill(worker, signal.SIGSTOP)
+            first = asyncio.create_task(site.command(C.MOVE_ABSOLUTE, joint_positions=AWAY))
+            await asyncio.sleep(1.3)
+            assert not first.done()
+            os.kill(worker, signal.SIGCONT)
+            assert (await first).accepted
+            await standing(site, AWAY)
+
+            os.kill(worker, signal.SIGSTOP)
+            text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=OUT, not_after=after(1.5)))
+            assert "takes longer than 1." in text
+            # Without a deadline.
+            site.id += 1
+            request = schema.CommandRequest(
+                command=C.MOVE_ABSOLUTE, joint_positions=OUT, lease=site.secret, id=site.id
+            )
+            begun_s = time.monotonic()
+            (reply,) = await asyncio.to_thread(raw, site, request)
+            assert "longer than 0.8 s" in str(reply.err.payload)
+            assert time.monotonic() - begun_s < 3.5, "it would have waited for 4 s with a deadline"
+
+            held = asyncio.create_task(site.command(C.MOVE_ABSOLUTE, joint_positions=OUT))
+            await asyncio.sleep(0.1)
+            await site.command(C.HOLD)
+            await site.stop(reason="look")
+            assert not held.done()
+            os.kill(worker, signal.SIGCONT)
+            await refusal(held)
+        assert np.allclose(site.joints, AWAY, atol=1e-3)
 
 
 def after(seconds):
@@ -226,39 +209,31 @@ def worker_of(parent):
     raise AssertionError("no worker process")
 
 
-def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
+async def test_required_a_robot_without_shapes_is_not_moved(mesh, tmp_path):
     urdf = tmp_path / "bare.urdf"
     urdf.write_text(BARE)
-
-    async def main():
-        bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
-        async with (
-            simulator(robot=str(urdf)) as port,
-            gateway(mesh, tmp_path, port, check="require", cell=bare, description=str(urdf)) as site,
-        ):
-            await until(lambda: "no link with a shape" in site.controller.check_text, timeout_s=60)
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            assert "no link with a shape" in await refusal(site.command(C.HOME))
-
-    run(main(), timeout_s=90)
+    bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
+    async with (
+        simulator(robot=str(urdf)) as port,
+        gateway(mesh, tmp_path, port, check="require", cell=bare, description=str(urdf)) as site,
+    ):
+        await until(lambda: "no link with a shape" in site.controller.check_text, timeout_s=60)
+        await site.lease(A.ACQUIRE, ttl_s=5)
+        assert "no link with a shape" in await refusal(site.command(C.HOME))
 
 
-def test_required_a_moving_link_without_a_shape_is_refused(mesh, tmp_path):
+async def test_required_a_moving_link_without_a_shape_is_refused(mesh, tmp_path):
     model = bar_arm(tmp_path / "half", bare=("elbow",))
-
-    async def main():
-        half = CellDescription((CellRobot("arm", model, np.eye(4)),))
-        async with (
-            simulator(robot=str(model)) as port,
-            gateway(mesh, tmp_path, port, check="require", cell=half, description=str(model)) as site,
-        ):
-            await until(lambda: not site.controller.check_text, timeout_s=60)
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            text = await refusal(site.command(C.HOME))
-            assert "cannot be checked" in text
-            assert "elbow moves and has no shape" in text
-
-    run(main(), timeout_s=90)
+    half = CellDescription((CellRobot("arm", model, np.eye(4)),))
+    async with (
+        simulator(robot=str(model)) as port,
+        gateway(mesh, tmp_path, port, check="require", cell=half, description=str(model)) as site,
+    ):
+        await until(lambda: not site.controller.check_text, timeout_s=60)
+        await site.lease(A.ACQUIRE, ttl_s=5)
+        text = await refusal(site.command(C.HOME))
+        assert "cannot be checked" in text
+        assert "elbow moves and has no shape" in text
 
 
 def test_with_doubtful_limits_require_refuses_and_warn_reports(mesh, tmp_path):
@@ -283,25 +258,21 @@ def test_with_doubtful_limits_require_refuses_and_warn_reports(mesh, tmp_path):
         assert "state their limits" in text
 
 
-def test_an_unchecked_motion_has_no_warning_about_clearance(mesh, tmp_path):
+async def test_an_unchecked_motion_has_no_warning_about_clearance(mesh, tmp_path):
     urdf = tmp_path / "bare.urdf"
     urdf.write_text(BARE)
-
-    async def main():
-        bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
-        async with (
-            simulator(robot=str(urdf)) as port,
-            gateway(mesh, tmp_path, port, check="warn", cell=bare, description=str(urdf)) as site,
-        ):
-            # Also while the check is starting.
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            await site.command(C.HOME)
-            event = (await until(lambda: site.events("check.skipped")))[0]
-            assert event.text.startswith("HOME: not checked: ")
-            assert "unchecked" in RULES[event.code].advice
-            assert not site.events("check.warning")
-
-    run(main(), timeout_s=90)
+    bare = CellDescription((CellRobot("arm", urdf, np.eye(4)),))
+    async with (
+        simulator(robot=str(urdf)) as port,
+        gateway(mesh, tmp_path, port, check="warn", cell=bare, description=str(urdf)) as site,
+    ):
+        # Also while the check is starting.
+        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.command(C.HOME)
+        event = (await until(lambda: site.events("check.skipped")))[0]
+        assert event.text.startswith("HOME: not checked: ")
+        assert "unchecked" in RULES[event.code].advice
+        assert not site.events("check.warning")
 
 
 BARE = """<robot name="bare"><link name="base"/><link name="tip"/>
@@ -309,49 +280,43 @@ BARE = """<robot name="bare"><link name="base"/><link name="tip"/>
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
-def test_robots_are_checked_along_the_paths_of_the_others(mesh, tmp_path):
-    async def main():
-        async with (
-            simulator() as port,
-            simulator() as other_port,
-            gateway(mesh, tmp_path, port, other_port, check="require", each=[{"cell": TWO}] * 2) as cell_site,
-            all_checked(cell_site) as (arm, other),
-        ):
-            await move(arm, OUT)
-            # During the motion, and after it, the other robot must not swing through it.
-            text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
-            assert "arm/" in text
-            await standing(arm, OUT)
-            text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
-            assert "arm/" in text
-            assert "arm-2/" in text
-            await move(arm, [radians(-90), 0, 0, 0, 0])
-            await standing(arm, [radians(-90), 0, 0, 0, 0])
-            # Sent concurrently, each allowed alone: the second is refused because of the first's path.
-            answers = await asyncio.gather(
-                move(arm, OUT),
-                move(other, [radians(90), 0, 0, 0, 0]),
-                return_exceptions=True,
-            )
-            refused = [answer for answer in answers if isinstance(answer, RefusedError)]
-            assert len(refused) == 1, answers
-            assert "arm-2/" in str(refused[0])
-
-    run(main(), timeout_s=120)
+async def test_robots_are_checked_along_the_paths_of_the_others(mesh, tmp_path):
+    async with (
+        simulator() as port,
+        simulator() as other_port,
+        gateway(mesh, tmp_path, port, other_port, check="require", each=[{"cell": TWO}] * 2) as cell_site,
+        all_checked(cell_site) as (arm, other),
+    ):
+        await move(arm, OUT)
+        # During the motion, and after it, the other robot must not swing through it.
+        text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
+        assert "arm/" in text
+        await standing(arm, OUT)
+        text = await refusal(move(other, [radians(90), 0, 0, 0, 0]))
+        assert "arm/" in text
+        assert "arm-2/" in text
+        await move(arm, [radians(-90), 0, 0, 0, 0])
+        await standing(arm, [radians(-90), 0, 0, 0, 0])
+        # Sent concurrently, each allowed alone: the second is refused because of the first's path.
+        answers = await asyncio.gather(
+            move(arm, OUT),
+            move(other, [radians(90), 0, 0, 0, 0]),
+            return_exceptions=True,
+        )
+        refused = [answer for answer in answers if isinstance(answer, RefusedError)]
+        assert len(refused) == 1, answers
+        assert "arm-2/" in str(refused[0])
 
 
-def test_required_an_unserved_robot_of_the_cell_is_refused(mesh, tmp_path):
-    async def main():
-        async with (
-            simulator() as port,
-            gateway(mesh, tmp_path, port, check="require", cell=TWO) as site,
-        ):
-            await until(lambda: not site.controller.check_text, timeout_s=60)
-            await site.lease(A.ACQUIRE, ttl_s=5)
-            text = await refusal(site.command(C.HOME))
-            assert "the position or the target of arm-2 (this gateway does not serve it)" in text
-
-    run(main(), timeout_s=90)
+async def test_required_an_unserved_robot_of_the_cell_is_refused(mesh, tmp_path):
+    async with (
+        simulator() as port,
+        gateway(mesh, tmp_path, port, check="require", cell=TWO) as site,
+    ):
+        await until(lambda: not site.controller.check_text, timeout_s=60)
+        await site.lease(A.ACQUIRE, ttl_s=5)
+        text = await refusal(site.command(C.HOME))
+        assert "the position or the target of arm-2 (this gateway does not serve it)" in text
 
 
 def test_an_unknown_policy_is_refused(mesh, tmp_path):

@@ -16,7 +16,6 @@ from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of
-from tests.conftest import run
 from tests.protocol_gateway.control_bench import control_bench
 from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 from tests.protocol_gateway.test_checked_motion import OUT, TWO, all_checked, move, standing
@@ -72,59 +71,50 @@ async def test_resume_and_another_motion_are_two_units(tmp_path):
         assert len(bench.socket) == 1
 
 
-def test_an_unchecked_robot_is_an_obstacle_for_the_others(mesh, tmp_path):
-    async def main():
-        policies = [{"cell": TWO, "check": "require"}, {"cell": TWO, "check": "off"}]
-        async with (
-            simulator() as port,
-            simulator() as other_port,
-            gateway(mesh, tmp_path, port, other_port, each=policies) as cell_site,
-            all_checked(cell_site) as (arm, other),
-        ):
-            await move(arm, [radians(-90), 0, 0, 0, 0])
-            await standing(arm, [radians(-90), 0, 0, 0, 0])
-            accepted = []
+async def test_an_unchecked_robot_is_an_obstacle_for_the_others(mesh, tmp_path):
+    policies = [{"cell": TWO, "check": "require"}, {"cell": TWO, "check": "off"}]
+    async with (
+        simulator() as port,
+        simulator() as other_port,
+        gateway(mesh, tmp_path, port, other_port, each=policies) as cell_site,
+        all_checked(cell_site) as (arm, other),
+    ):
+        await move(arm, [radians(-90), 0, 0, 0, 0])
+        await standing(arm, [radians(-90), 0, 0, 0, 0])
+        accepted = []
 
-            async def asked(robot, target):
-                with contextlib.suppress(RefusedError):
-                    await move(robot, target)
-                    accepted.append(robot)
+        async def asked(robot, target):
+            with contextlib.suppress(RefusedError):
+                await move(robot, target)
+                accepted.append(robot)
 
-            await asyncio.gather(asked(other, [radians(90), 0, 0, 0, 0]), asked(arm, OUT))
-            # If both are accepted, the checked one was first, and its path was free.
-            assert accepted in ([other], [arm], [arm, other])
-
-    run(main(), timeout_s=120)
+        await asyncio.gather(asked(other, [radians(90), 0, 0, 0, 0]), asked(arm, OUT))
+        # If both are accepted, the checked one was first, and its path was free.
+        assert accepted in ([other], [arm], [arm, other])
 
 
-def test_a_stop_ends_a_waiting_program_even_if_reset_immediately(mesh, tmp_path):
-    async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-            await site.home()
-            await start(site, "wait 2\nmove_joints -60 90 -90 0 0\n")
-            await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
-            for _ in range(3):
-                stop = await site.stop(by="wang")
-                site.id += 1
-                request = schema.CommandRequest(
-                    command=C.RESET, lease=site.secret, id=site.id, stop_id=stop.stop_id
-                )
-                # After the answer to the stop, within one poll of the program.
-                await site.session.ask(site.key("command/li"), request)
-            state = await ended(site, RUN.ENDED)
-            assert state.text.startswith("stopped")
-
-    run(main(), timeout_s=60)
+async def test_a_stop_ends_a_waiting_program_even_if_reset_immediately(mesh, tmp_path):
+    async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+        await site.home()
+        await start(site, "wait 2\nmove_joints -60 90 -90 0 0\n")
+        await until(lambda: states(site)[-1].outcome == RUN.RUNNING)
+        for _ in range(3):
+            stop = await site.stop(by="wang")
+            site.id += 1
+            request = schema.CommandRequest(
+                command=C.RESET, lease=site.secret, id=site.id, stop_id=stop.stop_id
+            )
+            # After the answer to the stop, within one poll of the program.
+            await site.session.ask(site.key("command/li"), request)
+        state = await ended(site, RUN.ENDED)
+        assert state.text.startswith("stopped")
 
 
-def test_a_program_is_planned_from_the_robots_positions(mesh, tmp_path):
-    async def main():
-        async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-            await site.home()
-            await site.command(C.SPEED, speed_percent=5)
-            await site.command(C.MOVE_ABSOLUTE, joint_positions=[radians(-60), 1.57, -1.57, 0, 0])
-            await until(lambda: site.joints[0] < -0.02)
-            with refused(codes.ROBOT_MOVES_HOME):
-                await start(site, "move_joints -20 90 -90 0 0\n")
-
-    run(main(), timeout_s=60)
+async def test_a_program_is_planned_from_the_robots_positions(mesh, tmp_path):
+    async with simulator() as port, gateway(mesh, tmp_path, port) as site:
+        await site.home()
+        await site.command(C.SPEED, speed_percent=5)
+        await site.command(C.MOVE_ABSOLUTE, joint_positions=[radians(-60), 1.57, -1.57, 0, 0])
+        await until(lambda: site.joints[0] < -0.02)
+        with refused(codes.ROBOT_MOVES_HOME):
+            await start(site, "move_joints -20 90 -90 0 0\n")

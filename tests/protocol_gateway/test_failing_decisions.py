@@ -1,6 +1,5 @@
 """Each decision on an event fails in turn: what a stop and a command promise must still hold."""
 
-import asyncio
 import contextlib
 import errno
 
@@ -284,7 +283,7 @@ TABLE = [
 
 @pytest.mark.parametrize(("begin", "happens", "promise"), TABLE)
 @pytest.mark.parametrize("send_error", [CUT, FAULT], ids=["link", "fault"])
-def test_a_decision_that_fails_breaks_no_promise(clock, begin, happens, promise, send_error):
+async def test_a_decision_that_fails_breaks_no_promise(clock, begin, happens, promise, send_error):
     async def one(failing):
         bench = Bench(clock, send_error)
         await getattr(bench, begin)()
@@ -299,10 +298,7 @@ def test_a_decision_that_fails_breaks_no_promise(clock, begin, happens, promise,
         await bench.control.close()
         return calls
 
-    async def main():
-        calls = await one(None)
-        assert calls
-        for number, (name, text, _) in enumerate(calls):
-            assert (await one(number))[number] == (name, text, False)
-
-    asyncio.run(main())
+    calls = await one(None)
+    assert calls
+    for number, (name, text, _) in enumerate(calls):
+        assert (await one(number))[number] == (name, text, False)

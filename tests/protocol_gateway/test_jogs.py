@@ -164,120 +164,108 @@ def elsewhere():
     return pinocchio.buildModelFromXML(to_urdf(load("pt600")))
 
 
-def test_a_jog_is_one_line_never_more_than_10_mm_ahead_with_two_audit_entries(mesh, tmp_path, elsewhere):
-    async def main():
-        async with (
-            simulator() as port,
-            tapped(port) as (wire, tap),
-            gateway(mesh, tmp_path, wire, check="require") as site,
-            in_control(site),
+async def test_a_jog_is_a_line_never_more_than_10_mm_ahead_with_two_audit_entries(mesh, tmp_path, elsewhere):
+    async with (
+        simulator() as port,
+        tapped(port) as (wire, tap),
+        gateway(mesh, tmp_path, wire, check="require") as site,
+        in_control(site),
+    ):
+        await site.command(C.SPEED, speed_percent=50)
+        tap.targets.clear()
+        end = await jogged_and_released(site, 0.06, axis=J.Y, speed=-0.1)
+        assert (end.text, end.reason.code, end.rotary) == ("released", "jog.released", False)
+        ways = [(tool_of(at, elsewhere), tool_of(to, elsewhere)) for at, to in tap.targets]
+        ahead = [np.linalg.norm(to[:3, 3] - at[:3, 3]) for at, to in ways]
+        assert len(ahead) > 5
+        assert max(ahead) <= 0.0101
+        begin = tool_of(REST, elsewhere)
+        for _, to in ways:
+            assert abs(to[:3, 3] - begin[:3, 3])[[0, 2]].max() < 1e-3
+            assert degrees(np.arccos(min(to[:3, 2] @ begin[:3, 2], 1.0))) < 15.0
+        # Nothing is on hold, and the operator's speed is set again.
+        await until(lambda: site.controller.activity == STATE.IDLE)
+        await until(lambda: site.controller.speed_percent == 50)
+        assert not site.controller.HasField("stop")
+        assert not site.controller.HasField("jog")
+        await until(lambda: entries(site) and entries(site)[-1].request == "JOG_END")
+        jog, jog_end = entries(site)[-2:]
+        assert (jog.request, jog.values["jog_axis"], jog.values["jog_speed"]) == ("JOG", "Y", "-0.1")
+        assert float(jog_end.values["moved_m"]) == pytest.approx(end.moved, abs=1e-6)
+        apart = tool_of(site.joints, elsewhere)[:3, 3] - begin[:3, 3]
+        last = [each for each in entries(site) if each.request == "JOG_END"]
+        total = sum(float(each.values["moved_m"]) for each in last)
+        assert np.linalg.norm(apart) == pytest.approx(total, abs=1e-3)
+        # No part of the jog has an entry of its own.
+        assert sum(each.request == "MOVE_ABSOLUTE" for each in site.seen["audit"]) == 1
+
+
+async def test_without_a_keep_alive_the_robot_is_held_without_a_latch(mesh, tmp_path):
+    async with jog_site(mesh, tmp_path) as site:
+        before = list(site.joints)
+        await begin(site)
+        await until(lambda: entries(site) and entries(site)[-1].request == "JOG_END")
+        assert entries(site)[-1].reason.causes[0].code == "jog.not_held_down"
+        assert site.joints == before
+        await jogged(site, 0.03)
+        end = await ended(site)
+        assert end.causes[0].code == "jog.not_alive"
+        assert entries(site)[-1].outcome == schema.AuditEntry.FAILED
+        assert float(entries(site)[-1].values["moved_m"]) > 0.03
+        await until(lambda: not site.controller.HasField("jog"))
+        assert not site.controller.HasField("stop")
+        assert (await ask(site, 1000)).reason.code == "jog.not_alive"
+        await moved_to(site, REST)
+        # A gateway that was busy holds, too: the keep-alives that came meanwhile do not count.
+        await jogged(site, 0.02)
+        time.sleep(0.4)  # noqa: ASYNC251 - the gateway shares this loop
+        with contextlib.suppress(RefusedError):
+            await ask(site, 2000)
+        end = await at_rest(site, 3000)
+        assert end.reason.code == "jog.not_alive"
+
+
+async def test_only_the_holders_new_keep_alives_count(mesh, tmp_path):
+    async with jog_site(mesh, tmp_path) as site:
+        number = await jogged(site, 0.02)
+        for fields, text in (
+            ({"operator": "wu"}, "li is in control"),
+            ({"lease": "guessed"}, "control"),
+            ({"jog": site.id + 1}, "no jog"),
+            ({"sequence": 1}, "is not new"),
         ):
-            await site.command(C.SPEED, speed_percent=50)
-            tap.targets.clear()
-            end = await jogged_and_released(site, 0.06, axis=J.Y, speed=-0.1)
-            assert (end.text, end.reason.code, end.rotary) == ("released", "jog.released", False)
-            ways = [(tool_of(at, elsewhere), tool_of(to, elsewhere)) for at, to in tap.targets]
-            ahead = [np.linalg.norm(to[:3, 3] - at[:3, 3]) for at, to in ways]
-            assert len(ahead) > 5
-            assert max(ahead) <= 0.0101
-            begin = tool_of(REST, elsewhere)
-            for _, to in ways:
-                assert abs(to[:3, 3] - begin[:3, 3])[[0, 2]].max() < 1e-3
-                assert degrees(np.arccos(min(to[:3, 2] @ begin[:3, 2], 1.0))) < 15.0
-            # Nothing is on hold, and the operator's speed is set again.
-            await until(lambda: site.controller.activity == STATE.IDLE)
-            await until(lambda: site.controller.speed_percent == 50)
-            assert not site.controller.HasField("stop")
-            assert not site.controller.HasField("jog")
-            await until(lambda: entries(site) and entries(site)[-1].request == "JOG_END")
-            jog, jog_end = entries(site)[-2:]
-            assert (jog.request, jog.values["jog_axis"], jog.values["jog_speed"]) == ("JOG", "Y", "-0.1")
-            assert float(jog_end.values["moved_m"]) == pytest.approx(end.moved, abs=1e-6)
-            apart = tool_of(site.joints, elsewhere)[:3, 3] - begin[:3, 3]
-            last = [each for each in entries(site) if each.request == "JOG_END"]
-            total = sum(float(each.values["moved_m"]) for each in last)
-            assert np.linalg.norm(apart) == pytest.approx(total, abs=1e-3)
-            # No part of the jog has an entry of its own.
-            assert sum(each.request == "MOVE_ABSOLUTE" for each in site.seen["audit"]) == 1
+            values = {"sequence": number + 1, **fields}
+            assert text in await refusal(ask(site, values.pop("sequence"), **values))
 
-    run(main(), timeout_s=240)
+        def refused():
+            return [each for each in site.seen["audit"] if each.request == "JOG_KEEP_ALIVE"]
+
+        await until(lambda: any(each.operator == "wu" for each in refused()))
+        assert {each.outcome for each in refused()} == {schema.AuditEntry.REFUSED}
+        await at_rest(site, number + 1)
 
 
-def test_without_a_keep_alive_the_robot_is_held_without_a_latch(mesh, tmp_path):
-    async def main():
-        async with jog_site(mesh, tmp_path) as site:
-            before = list(site.joints)
-            await begin(site)
-            await until(lambda: entries(site) and entries(site)[-1].request == "JOG_END")
-            assert entries(site)[-1].reason.causes[0].code == "jog.not_held_down"
-            assert site.joints == before
-            await jogged(site, 0.03)
-            end = await ended(site)
-            assert end.causes[0].code == "jog.not_alive"
-            assert entries(site)[-1].outcome == schema.AuditEntry.FAILED
-            assert float(entries(site)[-1].values["moved_m"]) > 0.03
-            await until(lambda: not site.controller.HasField("jog"))
-            assert not site.controller.HasField("stop")
-            assert (await ask(site, 1000)).reason.code == "jog.not_alive"
-            await moved_to(site, REST)
-            # A gateway that was busy holds, too: the keep-alives that came meanwhile do not count.
-            await jogged(site, 0.02)
-            time.sleep(0.4)  # noqa: ASYNC251 - the gateway shares this loop
+async def test_other_commands_a_stop_and_the_end_of_control_end_a_jog(mesh, tmp_path):
+    async with jog_site(mesh, tmp_path) as site:
+
+        async def begin_another():
             with contextlib.suppress(RefusedError):
-                await ask(site, 2000)
-            end = await at_rest(site, 3000)
-            assert end.reason.code == "jog.not_alive"
+                await begin(site)
 
-    run(main(), timeout_s=240)
+        async def stop():
+            stopped = await site.stop(by="wu", reason="too near")
+            await until(lambda: site.controller.activity == STATE.STOPPED)
+            assert site.controller.stop.id == stopped.stop_id
+            await begin_refused(site, "latched")
+            await site.command(C.RESET, stop_id=stopped.stop_id)
 
-
-def test_only_the_holders_new_keep_alives_count(mesh, tmp_path):
-    async def main():
-        async with jog_site(mesh, tmp_path) as site:
-            number = await jogged(site, 0.02)
-            for fields, text in (
-                ({"operator": "wu"}, "li is in control"),
-                ({"lease": "guessed"}, "control"),
-                ({"jog": site.id + 1}, "no jog"),
-                ({"sequence": 1}, "is not new"),
-            ):
-                values = {"sequence": number + 1, **fields}
-                assert text in await refusal(ask(site, values.pop("sequence"), **values))
-
-            def refused():
-                return [each for each in site.seen["audit"] if each.request == "JOG_KEEP_ALIVE"]
-
-            await until(lambda: any(each.operator == "wu" for each in refused()))
-            assert {each.outcome for each in refused()} == {schema.AuditEntry.REFUSED}
-            await at_rest(site, number + 1)
-
-    run(main(), timeout_s=240)
-
-
-def test_other_commands_a_stop_and_the_end_of_control_end_a_jog(mesh, tmp_path):
-    async def main():
-        async with jog_site(mesh, tmp_path) as site:
-
-            async def begin_another():
-                with contextlib.suppress(RefusedError):
-                    await begin(site)
-
-            async def stop():
-                stopped = await site.stop(by="wu", reason="too near")
-                await until(lambda: site.controller.activity == STATE.STOPPED)
-                assert site.controller.stop.id == stopped.stop_id
-                await begin_refused(site, "latched")
-                await site.command(C.RESET, stop_id=stopped.stop_id)
-
-            assert await ended_by(site, begin_another) == "jog.commanded"
-            assert await ended_by(site, lambda: site.command(C.HOLD)) == "jog.commanded"
-            assert await ended_by(site, stop) == "program.stopped"
-            await jogged(site, 0.02)
-            await site.lease(A.TAKE, operator="wu", reason="night shift")
-            assert (await ended(site)).causes[0].code in ("program.stopped", "program.control_ended")
-            await until(lambda: site.controller.HasField("stop"))
-
-    run(main(), timeout_s=240)
+        assert await ended_by(site, begin_another) == "jog.commanded"
+        assert await ended_by(site, lambda: site.command(C.HOLD)) == "jog.commanded"
+        assert await ended_by(site, stop) == "program.stopped"
+        await jogged(site, 0.02)
+        await site.lease(A.TAKE, operator="wu", reason="night shift")
+        assert (await ended(site)).causes[0].code in ("program.stopped", "program.control_ended")
+        await until(lambda: site.controller.HasField("stop"))
 
 
 async def ended_by(site, act):
@@ -302,21 +290,18 @@ async def ended(site):
     return [each for each in entries(site) if each.request == "JOG_END"][-1].reason
 
 
-def test_a_jog_ends_at_a_limit_and_before_an_obstacle(mesh, tmp_path):
-    async def main():
-        async with jog_site(mesh, tmp_path, check="require", cell=one_robot_cell(POST)) as site:
-            near = [radians(-149), *REST[1:]]
-            await moved_to(site, near)
-            end = await to_its_end(site, jog=J(frame=J.JOINT, joint=1, speed=-0.2))
-            assert end.reason.code == "joints.outside"
-            assert degrees(site.joints[0]) == pytest.approx(-150, abs=0.2)
-            towards = [radians(60), *REST[1:]]
-            await moved_to(site, towards)
-            end = await to_its_end(site, jog=J(frame=J.JOINT, joint=1, speed=0.3))
-            assert "post" in end.text
-            assert degrees(site.joints[0]) < 90
-
-    run(main(), timeout_s=240)
+async def test_a_jog_ends_at_a_limit_and_before_an_obstacle(mesh, tmp_path):
+    async with jog_site(mesh, tmp_path, check="require", cell=one_robot_cell(POST)) as site:
+        near = [radians(-149), *REST[1:]]
+        await moved_to(site, near)
+        end = await to_its_end(site, jog=J(frame=J.JOINT, joint=1, speed=-0.2))
+        assert end.reason.code == "joints.outside"
+        assert degrees(site.joints[0]) == pytest.approx(-150, abs=0.2)
+        towards = [radians(60), *REST[1:]]
+        await moved_to(site, towards)
+        end = await to_its_end(site, jog=J(frame=J.JOINT, joint=1, speed=0.3))
+        assert "post" in end.text
+        assert degrees(site.joints[0]) < 90
 
 
 async def to_its_end(site, **fields):
@@ -336,34 +321,31 @@ async def to_its_end(site, **fields):
             return answer
 
 
-def test_what_cannot_be_jogged_is_refused_in_words(mesh, tmp_path):
-    async def main():
-        async with jog_site(mesh, tmp_path, jog_speed=0.1) as site:
-            before = list(site.joints)
-            for jog, code in (
-                (J(frame=J.BASE, axis=J.X, speed=float("nan")), "request.invalid"),
-                (J(frame=J.BASE, axis=J.X, speed=1e9), "jog.speed"),
-                (J(frame=J.BASE, axis=J.X), "jog.speed"),
-                (J(frame=J.BASE, axis=J.ROLL, speed=0.6), "jog.speed"),
-                (J(frame=J.BASE, speed=0.1), "jog.axis"),
-                (J(axis=J.X, speed=0.1), "request.invalid"),
-                (J(frame=J.JOINT, joint=6, speed=0.1), "jog.joint"),
-                (J(frame=J.JOINT, speed=0.1), "jog.joint"),
-                # The roll of a five-joint arm about its tool's axis.
-                (J(frame=J.TOOL, axis=J.YAW, speed=0.1), "program.unreachable"),
-            ):
-                with pytest.raises(RefusedError) as caught:
-                    await begin(site, jog=jog)
-                assert caught.value.reason.code == code
+async def test_what_cannot_be_jogged_is_refused_in_words(mesh, tmp_path):
+    async with jog_site(mesh, tmp_path, jog_speed=0.1) as site:
+        before = list(site.joints)
+        for jog, code in (
+            (J(frame=J.BASE, axis=J.X, speed=float("nan")), "request.invalid"),
+            (J(frame=J.BASE, axis=J.X, speed=1e9), "jog.speed"),
+            (J(frame=J.BASE, axis=J.X), "jog.speed"),
+            (J(frame=J.BASE, axis=J.ROLL, speed=0.6), "jog.speed"),
+            (J(frame=J.BASE, speed=0.1), "jog.axis"),
+            (J(axis=J.X, speed=0.1), "request.invalid"),
+            (J(frame=J.JOINT, joint=6, speed=0.1), "jog.joint"),
+            (J(frame=J.JOINT, speed=0.1), "jog.joint"),
+            # The roll of a five-joint arm about its tool's axis.
+            (J(frame=J.TOOL, axis=J.YAW, speed=0.1), "program.unreachable"),
+        ):
             with pytest.raises(RefusedError) as caught:
-                await site.command(C.JOG)
-            assert caught.value.reason.code == "jog.missing"
-            with pytest.raises(RefusedError) as caught:
-                await begin(site, lease="another")
-            assert caught.value.reason.code == "lease.other"
-            assert site.joints == before
-
-    run(main(), timeout_s=240)
+                await begin(site, jog=jog)
+            assert caught.value.reason.code == code
+        with pytest.raises(RefusedError) as caught:
+            await site.command(C.JOG)
+        assert caught.value.reason.code == "jog.missing"
+        with pytest.raises(RefusedError) as caught:
+            await begin(site, lease="another")
+        assert caught.value.reason.code == "lease.other"
+        assert site.joints == before
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import contextlib
 from itertools import groupby
 
 from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, simulator, until
-from tests.protocol_gateway.old_client import ME, in_loop, legacy, legacy_site, program
+from tests.protocol_gateway.old_client import ME, legacy, legacy_site, program
 
 PAPER = b"2# COMMAND* trace; home&ABSOLUTE.DEG* 100.00; 30.45; 92.66; - 67.10; - 25.85@"
 SAMPLE = [100.00, 30.45, 92.66, -67.10, -25.85]
@@ -15,7 +15,6 @@ def degrees(site):
     return [joint.position * 57.29577951308232 for joint in site.seen["joints"][-1].joints]
 
 
-@in_loop
 async def test_old_programs_read_the_same_states_as_the_mesh(mesh, tmp_path):
     settings = legacy(commanders={})
     async with (
@@ -40,7 +39,6 @@ async def test_old_programs_read_the_same_states_as_the_mesh(mesh, tmp_path):
         await until(lambda: site.controller.legacy_clients.attached == 2)
 
 
-@in_loop
 async def test_the_papers_unit_homes_and_moves_the_robot(mesh, tmp_path):
     settings = legacy()
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
@@ -76,7 +74,6 @@ async def homed_by_li(site, one):
     await until(is_homed, timeout_s=30)
 
 
-@in_loop
 async def test_two_seconds_of_silence_during_motion_stop_the_robot(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await homed_by_li(site, one)
@@ -91,7 +88,6 @@ async def test_two_seconds_of_silence_during_motion_stop_the_robot(mesh, tmp_pat
         assert await one.asks(b"1#ABSOLUTE.DEG*0;0;0;0;0@") == (8, one.errors[-1].text)
 
 
-@in_loop
 async def test_units_without_requests_renew_the_lease(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         one.say(b"1#COMMAND*trace@")
@@ -107,7 +103,6 @@ async def test_units_without_requests_renew_the_lease(mesh, tmp_path):
         await until(lambda: not site.seen["lease"][-1].holder)
 
 
-@in_loop
 async def test_a_killed_connection_stops_the_motion(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as watcher:
         async with program(settings) as one:
@@ -121,7 +116,6 @@ async def test_a_killed_connection_stops_the_motion(mesh, tmp_path):
         await until(lambda: not site.seen["lease"][-1].holder)
 
 
-@in_loop
 async def test_operators_of_the_mesh_and_of_old_programs_refuse_each_other(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await site.lease(A.ACQUIRE, operator="wang", ttl_s=5)
@@ -142,7 +136,6 @@ async def test_operators_of_the_mesh_and_of_old_programs_refuse_each_other(mesh,
         assert refused
 
 
-@in_loop
 async def test_a_client_that_may_not_command_can_read_and_stop(mesh, tmp_path):
     settings = legacy(commanders={"10.0.0.9": "li"})
     simulated = {"demo": True}
@@ -167,7 +160,6 @@ async def test_a_client_that_may_not_command_can_read_and_stop(mesh, tmp_path):
         assert site.controller.counters.units_sent == 1
 
 
-@in_loop
 async def test_refusals_have_the_protocols_error_numbers(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
@@ -193,7 +185,6 @@ async def test_refusals_have_the_protocols_error_numbers(mesh, tmp_path):
         assert site.controller.counters.refusals == 0
 
 
-@in_loop
 async def test_reset_does_not_clear_a_stop_that_was_just_sent(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
@@ -211,7 +202,6 @@ async def test_reset_does_not_clear_a_stop_that_was_just_sent(mesh, tmp_path):
         await until(lambda: "homing" in one.words)
 
 
-@in_loop
 async def test_a_stop_overtakes_queued_units(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         await until(lambda: one.positions)
@@ -222,7 +212,6 @@ async def test_a_stop_overtakes_queued_units(mesh, tmp_path):
         assert site.controller.homed == STATE.NO
 
 
-@in_loop
 async def test_a_read_only_robot_refuses_commands_of_clients(mesh, tmp_path):
     settings = legacy()
     async with legacy_site(mesh, tmp_path, settings, stop_proven=False) as site, program(settings) as one:
@@ -234,7 +223,6 @@ async def test_a_read_only_robot_refuses_commands_of_clients(mesh, tmp_path):
         assert site.controller.counters.units_sent == 0
 
 
-@in_loop
 async def test_clients_speak_the_controllers_codes(mesh, tmp_path):
     codes = {2: "ABSOLUTE.DEG", 6: "ERROR", 101: "COMMAND:home", 102: "COMMAND:stop", 104: "COMMAND:reset"}
     simulated, settings = {"codes": codes}, legacy()
@@ -256,7 +244,6 @@ async def test_clients_speak_the_controllers_codes(mesh, tmp_path):
 # -------------------------------------------------------------------------- link
 
 
-@in_loop
 async def test_a_lost_link_closes_only_clients_that_got_states(mesh, tmp_path):
     settings = legacy()
     async with contextlib.AsyncExitStack() as stack:
@@ -277,7 +264,6 @@ async def test_a_lost_link_closes_only_clients_that_got_states(mesh, tmp_path):
             await until(lambda: two.positions, timeout_s=20)
 
 
-@in_loop
 async def test_a_controllers_refusal_is_relayed_only_to_the_client_in_control(mesh, tmp_path):
     settings = legacy()
 
@@ -308,7 +294,6 @@ async def test_a_controllers_refusal_is_relayed_only_to_the_client_in_control(me
             assert two.errors == []
 
 
-@in_loop
 async def test_a_robot_moves_without_the_port_of_old_programs_and_gets_it_when_it_is_free(
     mesh, tmp_path, monkeypatch
 ):

@@ -15,10 +15,9 @@ from protocol_gateway.core.stream import UnitStream
 from protocol_gateway.serving.rate_limit import Budget, Limits
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.protocol_gateway.gateway_site import STATE, until
-from tests.protocol_gateway.old_client import ME, Program, in_loop, legacy, legacy_site, program
+from tests.protocol_gateway.old_client import ME, Program, legacy, legacy_site, program
 
 
-@in_loop
 async def test_excess_clients_are_rejected_and_affect_no_other(mesh, tmp_path):
     settings = legacy(most=2)
     simulated = {"demo": True}
@@ -40,7 +39,6 @@ async def test_excess_clients_are_rejected_and_affect_no_other(mesh, tmp_path):
             await until(lambda: again.positions)
 
 
-@in_loop
 async def test_a_client_that_does_not_read_is_closed_and_delays_no_other(mesh, tmp_path):
     settings = legacy()
     simulated = {"demo": True, "rate_hz": 1000.0}
@@ -59,7 +57,6 @@ async def test_a_client_that_does_not_read_is_closed_and_delays_no_other(mesh, t
         assert "does not read" in (await site.event("legacy.closed", 0)).text
 
 
-@in_loop
 async def test_a_slow_reader_gets_the_newest_state(mesh, tmp_path):
     settings = legacy()
     simulated = {"demo": True, "rate_hz": 1000.0}
@@ -78,7 +75,6 @@ async def test_a_slow_reader_gets_the_newest_state(mesh, tmp_path):
             assert max(jumps) > 0.3
 
 
-@in_loop
 async def test_a_flooding_client_is_closed_but_its_stop_is_executed(mesh, tmp_path):
     settings = legacy(commanders={})
     simulated = {"demo": True}
@@ -95,7 +91,6 @@ async def test_a_flooding_client_is_closed_but_its_stop_is_executed(mesh, tmp_pa
         await until(lambda: site.controller.legacy_clients.attached == 1)
 
 
-@in_loop
 async def test_garbage_is_counted_and_answered(mesh, tmp_path):
     async with legacy_site(mesh, tmp_path, settings := legacy()) as site, program(settings) as one:
         one.say(b"\xff\x00#@", b"hello\r\n@", b"1#COMMAND*trace@")
@@ -115,7 +110,6 @@ async def test_garbage_is_counted_and_answered(mesh, tmp_path):
         assert entries[0].text == f"Not sent: {one.errors[0].text}."
 
 
-@in_loop
 async def test_answers_to_a_vanished_client_are_not_logged(mesh, tmp_path, caplog):
     settings = legacy(commanders={})
     async with legacy_site(mesh, tmp_path, settings) as site:
@@ -174,7 +168,6 @@ def cable():
         networks(f"netns del {name}")
 
 
-@in_loop
 async def test_a_pulled_cable_ends_control_in_seconds(mesh, tmp_path, cable):
     address, far, connect, pull_out = cable
     settings = legacy(host=address, commanders={far: "li"})

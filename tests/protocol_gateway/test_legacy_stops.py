@@ -5,12 +5,11 @@ import contextlib
 
 from protocol_gateway.serving.rate_limit import Limits
 from tests.protocol_gateway.gateway_site import STATE, until
-from tests.protocol_gateway.old_client import ME, Program, in_loop, legacy, legacy_site, program
+from tests.protocol_gateway.old_client import ME, Program, legacy, legacy_site, program
 
 TIME, STOP = b"1#TIME*1@", b"1#COMMAND*stop@"
 
 
-@in_loop
 async def test_from_a_throttled_client_only_stops_are_executed(mesh, tmp_path):
     settings = legacy(limits=Limits(units_per_s=10.0, burst_s=20.0))
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
@@ -25,7 +24,6 @@ async def test_from_a_throttled_client_only_stops_are_executed(mesh, tmp_path):
         await until(lambda: site.seen["lease"][-1].holder == "")
 
 
-@in_loop
 async def test_a_throttled_client_recovers(mesh, tmp_path):
     settings = legacy(limits=Limits(units_per_s=200.0, burst_s=0.5))
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
@@ -38,7 +36,6 @@ async def test_a_throttled_client_recovers(mesh, tmp_path):
         await until(traced)
 
 
-@in_loop
 async def test_a_stop_after_a_flood_is_executed(mesh, tmp_path):
     settings = legacy(commanders={}, limits=Limits(burst_s=0.1, patience_s=0.0))
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as one:
@@ -49,7 +46,6 @@ async def test_a_stop_after_a_flood_is_executed(mesh, tmp_path):
         await until(lambda: one.ended)
 
 
-@in_loop
 async def test_a_stop_of_a_rejected_client_is_executed(mesh, tmp_path):
     settings = legacy(commanders={}, most=1)
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings):
@@ -61,7 +57,6 @@ async def test_a_stop_of_a_rejected_client_is_executed(mesh, tmp_path):
             assert second.bytes == b"1#ERROR*1;too many clients@"
 
 
-@in_loop
 async def test_a_stop_code_of_a_rejected_client_is_executed(mesh, tmp_path):
     codes = {2: "ABSOLUTE.DEG", 5: "STATUS", 102: "COMMAND:stop"}
     simulated, settings = {"codes": codes}, legacy(commanders={}, most=1)
@@ -84,7 +79,6 @@ async def program_from(address, settings):
         await one.close()
 
 
-@in_loop
 async def test_readers_leave_a_place_for_the_first_commander(mesh, tmp_path):
     settings = legacy(commanders={"127.0.0.2": "li"}, most=2)
     async with legacy_site(mesh, tmp_path, settings) as site, program(settings) as reader:
