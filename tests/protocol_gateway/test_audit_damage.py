@@ -1,5 +1,6 @@
 """Damaged audit logs: if a stop may be lost, the gateway latches one, once, and reports it."""
 
+import asyncio
 import contextlib
 import json
 import os
