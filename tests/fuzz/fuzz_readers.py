@@ -1,6 +1,6 @@
 """Broken files for the readers of meshes and of robot.toml: real ones, changed at random.
 
-    python tests/fuzz/fuzz_readers.py [--inputs N] [--seconds S] [--seed N] [--reader 3ds] [--keep FOLDER]
+    python -m tests.fuzz.fuzz_readers [--inputs N] [--seconds S] [--seed N] [--reader 3ds] [--keep FOLDER]
 
 A reader may raise only the documented errors, within seconds and a bounded memory. Anything else ends
 the run with exit status 1 and its input in the folder.
@@ -10,7 +10,6 @@ import faulthandler
 import random
 import resource
 import signal
-import sys
 import tempfile
 import time
 import warnings
@@ -18,9 +17,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
 
 import numpy as np
 

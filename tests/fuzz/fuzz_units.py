@@ -1,6 +1,6 @@
 """Broken units for the gateway: what a controller may send it, and what an old client program may ask.
 
-    python tests/fuzz/fuzz_units.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.fuzz.fuzz_units [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Real units, changed at random, some in one input, cut into pieces anywhere. They may cause no exception and no
 leak. Joint positions and motions must equal those of a strict parser that is independent of the gateway's.
@@ -10,12 +10,7 @@ Anything else ends the run with exit status 1 and its input in the folder.
 import logging
 import random
 import re
-import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
 
 from google.protobuf.message import Message
 

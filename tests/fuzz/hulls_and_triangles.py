@@ -1,6 +1,6 @@
 """Hulls against meshes: does a hull miss a collision that the meshes show?
 
-    python tests/fuzz/hulls_and_triangles.py [--poses N] [--seed N] [--robots pt600,puma560,ur5]
+    python -m tests.fuzz.hulls_and_triangles [--poses N] [--seed N] [--robots pt600,puma560,ur5]
 
 Random positions within limits and constraints, of each arm without and with fixtures. A pair of links, or a
 link and a fixture, whose meshes touch and whose hulls do not ends the run with exit status 1.

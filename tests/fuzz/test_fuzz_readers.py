@@ -1,4 +1,4 @@
-"""A short run of the fuzzer; run `python tests/fuzz/fuzz_readers.py` for a long one."""
+"""A short run of the fuzzer; run `python -m tests.fuzz.fuzz_readers` for a long one."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A short run of the fuzzer of units; run `python tests/fuzz/fuzz_units.py` for a long one."""
+"""A short run of the fuzzer of units; run `python -m tests.fuzz.fuzz_units` for a long one."""
 
 import pytest
 

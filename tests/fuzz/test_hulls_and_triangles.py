@@ -1,4 +1,4 @@
-"""A run with some hundred poses; `python tests/fuzz/hulls_and_triangles.py` runs 10,000."""
+"""A run with some hundred poses; `python -m tests.fuzz.hulls_and_triangles` runs 10,000."""
 
 import pytest
 

@@ -1,7 +1,7 @@
 """Transcripts of drivers: calls and what they returned. A changed driver gets the same calls again.
 
-    python tests/fuzz/transcripts.py record FOLDER [--inputs N]
-    python tests/fuzz/transcripts.py replay FOLDER
+    python -m tests.fuzz.transcripts record FOLDER [--inputs N]
+    python -m tests.fuzz.transcripts replay FOLDER
 
 `record` runs the fuzz programs and the tests of conformance, `replay` prints what differs.
 Record with the version before a change (`git worktree add`), and replay with the changed one. Of timers, only
@@ -23,9 +23,6 @@ from functools import wraps
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[2])
 
 from protocol_gateway.link.timers import Timers
 from protocol_gateway.seam import Channel, Close, FateUnknown, Open, Report, Send, SetTimer

@@ -1,6 +1,6 @@
 """Broken files and replies of FANUC's controllers by FTP.
 
-    python tests/controllers/fanuc/fuzz_ftp.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.controllers.fanuc.fuzz_ftp [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Files and replies to the driver's own commands, changed at random, doubled, cut, out of order and without an
 end. They may cause no exception and no leak. Joints, poses and alarms must be those of a strict reading that
@@ -11,14 +11,9 @@ folder.
 
 import random
 import re
-import sys
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.ftp.driver import FILE, FTP, FtpDriver
@@ -46,16 +41,6 @@ COMMANDS = re.compile(
     rb"|RETR (CURPOS\.DG|IOSTATE\.DG|SFTYSIG\.DG|ERRACT\.LS|NUMREG\.VA|SYSFRAME\.VA))\r\n"
 )
 RADIAN = 0.017453292519943295
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        name="fanuc-ftp",
-        verdict="no exception, no joints, pose and alarm but what a strict reading of a whole file gives; "
-        "only the declared commands were sent, one at a time",
-    )
 
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -370,4 +355,10 @@ TOKENS = (
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        name="fanuc-ftp",
+        verdict="no exception, no joints, pose and alarm but what a strict reading of a whole file gives; "
+        "only the declared commands were sent, one at a time",
+    )

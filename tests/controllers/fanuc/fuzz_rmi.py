@@ -1,6 +1,6 @@
 """Broken answers of FANUC's controllers by RMI.
 
-    python tests/controllers/fanuc/fuzz_rmi.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.controllers.fanuc.fuzz_rmi [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Answers to the driver's own messages, changed at random, doubled, late and cut. They may cause no exception
 and no leak. A motion may be sent once, and only after an answer that a strict reading, which is independent
@@ -11,13 +11,8 @@ the run with exit status 1 and its input in the folder.
 
 import random
 import re
-import sys
 from collections import Counter
-from pathlib import Path
 from typing import Any, ClassVar
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.rmi.motion_driver import RMI, SESSION, FanucMotionDriver
@@ -87,16 +82,6 @@ TOKENS = (
     ),
     *(b" ", b"2147483648", b"16002", b"70000", b"\\u0046", b"[" * 2000),
 )
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        name="rmi",
-        verdict="no exception, no motion and no end of a motion but what a strict reading gives; nothing but "
-        "the driver's five messages was sent",
-    )
 
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -367,4 +352,10 @@ class Reader:
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        name="rmi",
+        verdict="no exception, no motion and no end of a motion but what a strict reading gives; nothing but "
+        "the driver's five messages was sent",
+    )

@@ -1,6 +1,6 @@
 """Broken answers of FANUC's controllers by SNPX.
 
-    python tests/controllers/fanuc/fuzz_snpx.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.controllers.fanuc.fuzz_snpx [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Answers to the driver's own questions, changed at random, doubled, late, cut, and from the tables of other
 clients. They may cause no exception and no leak. Joints, alarms and activities must be those of a strict
@@ -13,12 +13,7 @@ import math
 import random
 import re
 import struct
-import sys
 from collections import Counter, deque
-from pathlib import Path
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.fanuc.axes import FanucSettings
 from controllers.fanuc.driver import SNPX, SnpxDriver
@@ -46,16 +41,6 @@ ASSIGNMENT = re.compile(
     rb"CLRASG|SETASG 1\d{4} \d{1,3} (POS\[G1:0\]|PRG\[1\]|ALM\[1\]|R\[5\]|\$MNUTOOL\[1,1\]@1\.26"
     rb"|\$MNU(TOOL|FRAME)NUM\[1\]|\$MCR\.\$GENOVERRIDE|\$VERSION|\$SNPX_PARAM\.\$VERSION) \d{1,5}"
 )
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        name="snpx",
-        verdict="no exception, no joints and no alarm but what a strict reading gives; only questions and "
-        "the driver's own assignments were sent",
-    )
 
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -321,4 +306,10 @@ TOKENS = (
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        name="snpx",
+        verdict="no exception, no joints and no alarm but what a strict reading gives; only questions and "
+        "the driver's own assignments were sent",
+    )

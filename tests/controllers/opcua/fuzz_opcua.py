@@ -1,6 +1,6 @@
 """Broken lines of the process that reads OPC UA.
 
-    python tests/controllers/opcua/fuzz_opcua.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.controllers.opcua.fuzz_opcua [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Lines of a server's items and values, changed at random, cut and in the wrong order. They may cause no
 exception and no leak. Joints and stops must be those of a strict reading that is independent of the
@@ -11,13 +11,8 @@ ends the run with exit status 1 and its input in the folder.
 import json
 import math
 import random
-import sys
 from collections import Counter
-from pathlib import Path
 from typing import Any
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.opcua.driver import OPCUA, OpcUaDriver
 from controllers.opcua.settings import OpcUaSettings
@@ -45,15 +40,6 @@ TOKENS = (
     *(b"null", b"true", b"false", b"NaN", b"Infinity", b"-1", b"1e999", b'""', b"[]", b"{}", b"\n", b","),
     *(b'"found"', b'"values"', b'"alive"', b"]", b"}", b"\xff", b"99999999999999999999", b"17476"),
 )
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        name="opcua",
-        verdict="no exception, no joints and no activity but what a strict reading gives; nothing was sent",
-    )
 
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -350,4 +336,9 @@ def natural(name: str) -> list[tuple[int, str]]:
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        name="opcua",
+        verdict="no exception, no joints and no activity but what a strict reading gives; nothing was sent",
+    )

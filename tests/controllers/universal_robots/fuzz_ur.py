@@ -1,6 +1,6 @@
 """Broken messages of Universal Robots' controllers: RTDE and the primary interface.
 
-    python tests/controllers/universal_robots/fuzz_ur.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.controllers.universal_robots.fuzz_ur [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Real messages, changed at random, some in one input, cut into pieces anywhere. They may cause no exception and
 no leak. States and alarms must equal those of a strict parser that is independent of the gateway's. Anything
@@ -10,13 +10,8 @@ else ends the run with exit status 1 and its input in the folder.
 import math
 import random
 import struct
-import sys
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.universal_robots.interfaces.primary import Alarm, PrimaryStream, SafetyModeChanged
 from controllers.universal_robots.interfaces.rtde_reader import RtdeReader
@@ -25,15 +20,6 @@ from tests.fuzz.fuzzing import Finding, campaign, changed, cut
 
 LONGEST = 4096
 FIELDS = {"timestamp": "DOUBLE", "actual_q": "VECTOR6D", "robot_mode": "INT32", "payload": "DOUBLE"}
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        name="ur",
-        verdict="no exception, no state and no alarm but what a strict reading gives",
-    )
 
 
 def fuzz(messages: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -192,4 +178,9 @@ TOKENS = (
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        name="ur",
+        verdict="no exception, no state and no alarm but what a strict reading gives",
+    )

@@ -1,6 +1,6 @@
 """Broken messages of Universal Robots' controllers, to the driver that moves the arm.
 
-    python tests/controllers/universal_robots/fuzz_ur_motion.py [--inputs N] [--seconds S] [--seed N]
+    python -m tests.controllers.universal_robots.fuzz_ur_motion [--inputs N] [--seconds S] [--seed N]
         [--keep FOLDER]
 
 States by RTDE, lines of the dashboard and answers about inputs are changed at random, doubled, left out and
@@ -15,16 +15,11 @@ import math
 import random
 import re
 import struct
-import sys
 from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.universal_robots.driver import PRIMARY, RTDE
 from controllers.universal_robots.interfaces.state import OUTPUTS
@@ -101,17 +96,6 @@ STOPPED, PLAYING, WAITS = 1, 2, (3, 4, 5)
 FRESH_S, REMOTE_S, START_S, BLIND_S, ENDED_S, STILL_S = 0.2, 1.5, 0.5, 0.3, 0.05, 0.5
 # Timers end up to 0.1 s late; a state that is too old is excused once, a start too, by as much again.
 LATE_S = 0.25
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        seconds=7200.0,
-        name="ur-motion",
-        verdict="no exception, no joints, no program, no permission, no recovery and no end of a motion but "
-        "what a strict reading gives; nothing else was sent",
-    )
 
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -863,4 +847,11 @@ def _safety(state: dict[str, Any]) -> int | None:
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        seconds=7200.0,
+        name="ur-motion",
+        verdict="no exception, no joints, no program, no permission, no recovery and no end of a motion but "
+        "what a strict reading gives; nothing else was sent",
+    )

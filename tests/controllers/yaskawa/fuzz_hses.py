@@ -1,6 +1,6 @@
 """Broken answers of Yaskawa's controllers by HSES.
 
-    python tests/controllers/yaskawa/fuzz_hses.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.controllers.yaskawa.fuzz_hses [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 Answers to the driver's own questions, changed at random, doubled, late and in the wrong order. They may cause
 no exception and no leak. Joints, alarms and activities must be those of a strict reading that is independent
@@ -10,12 +10,7 @@ exit status 1 and its input in the folder.
 
 import random
 import struct
-import sys
 from collections import Counter, deque
-from pathlib import Path
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.yaskawa.axes import YaskawaSettings
 from controllers.yaskawa.driver import HSES, HsesDriver
@@ -38,15 +33,6 @@ READS = {0x70: 1, 0x72: 1, 0x73: 1, 0x74: 1, 0x75: 1, 0x77: 1, 0x78: 0x0E, 0x89:
 BUSY = (0xD8F1, 0xD8FA, 0xE444, 0xFFF6)
 TIMEOUT_S = 0.3
 NEW_SOCKET_EACH = 2000
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        name="yaskawa",
-        verdict="no exception, no joints and no alarm but what a strict reading gives; only reads were sent",
-    )
 
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -238,4 +224,9 @@ TOKENS = (
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        name="yaskawa",
+        verdict="no exception, no joints and no alarm but what a strict reading gives; only reads were sent",
+    )

@@ -1,6 +1,6 @@
 """Broken answers of Yaskawa's controllers by HSES, to the driver that moves the arm.
 
-    python tests/controllers/yaskawa/fuzz_hses_motion.py [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
+    python -m tests.controllers.yaskawa.fuzz_hses_motion [--inputs N] [--seconds S] [--seed N] [--keep FOLDER]
 
 A simulated network changes, doubles, delays, reorders and loses the answers on three sockets, which also
 close. The controller is held, faulted and switched to local control at random, and motions, stops and resets
@@ -13,15 +13,10 @@ import heapq
 import math
 import random
 import struct
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
-
-if __name__ == "__main__":
-    sys.path[0] = str(Path(__file__).parents[3])
 
 from controllers.yaskawa.axes import YaskawaSettings
 from controllers.yaskawa.driver import HSES
@@ -80,17 +75,6 @@ FRESH_S, STILL_S, START_S, BLIND_S, OTHERS_S, ENDED_S = 0.6, 0.5, 1.0, 1.0, 1.0,
 LATEST_S = 2.7
 # After HOLD was sent, or was not needed, it is sent again within this time, timers being late.
 REPEATED_S, REFUSED_S = 0.4, 1.2
-
-
-def main() -> None:
-    campaign(
-        __doc__,
-        fuzz,
-        seconds=7200.0,
-        name="yaskawa-motion",
-        verdict="no exception, no joints, no motion, no end of a motion and no end of HOLD but what a strict "
-        "reading gives; nothing but reads, motions and HOLD was sent",
-    )
 
 
 def fuzz(inputs: int, seed: int, counts: Counter[str]) -> tuple[int, Finding | None]:
@@ -625,4 +609,11 @@ def _is_hold(data: bytes, *, on: bool) -> bool:
 
 
 if __name__ == "__main__":
-    main()
+    campaign(
+        __doc__,
+        fuzz,
+        seconds=7200.0,
+        name="yaskawa-motion",
+        verdict="no exception, no joints, no motion, no end of a motion and no end of HOLD but what a strict "
+        "reading gives; nothing but reads, motions and HOLD was sent",
+    )
