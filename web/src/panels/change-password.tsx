@@ -4,9 +4,11 @@ import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { accountText as a } from "../i18n/texts";
 import type { Me } from "../mesh/console/account";
 import { me, post } from "../mesh/console/account";
+import { reasonOf } from "../mesh/console/connection";
 import { RefusedRequest } from "../mesh/console/refusal";
 import { Button } from "../ui/button";
 import { PasswordField } from "../ui/password-field";
+import { submit } from "../ui/submit";
 import "./account-form.css";
 
 export function ChangePassword({ close }: { close: () => void }) {
@@ -36,7 +38,7 @@ export function ChangePassword({ close }: { close: () => void }) {
       me.value = await post<Me>("password", { password: oldPassword, new: newPassword });
       setOutcome({ done: true, text: a("changed") });
     } catch (error) {
-      const text = error instanceof Error ? error.message : String(error);
+      const text = reasonOf(error);
       setOutcome({ done: false, text: a("not_changed", { text }) });
       if (error instanceof RefusedRequest && error.reason?.code === "account.password_wrong") {
         setOldPassword("");
@@ -46,14 +48,7 @@ export function ChangePassword({ close }: { close: () => void }) {
     setBusy(false);
   };
   return (
-    <form
-      ref={form}
-      aria-label={a("change_password")}
-      onSubmit={(event) => {
-        event.preventDefault();
-        void send();
-      }}
-    >
+    <form ref={form} aria-label={a("change_password")} onSubmit={submit(() => void send())}>
       {/* For password managers: the account's name. */}
       <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
       <PasswordField

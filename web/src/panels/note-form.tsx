@@ -4,14 +4,15 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { notesText as n, t } from "../i18n/texts";
 import { mayAct } from "../mesh/console/account";
-import { hello, reasonOf } from "../mesh/console/connection";
-import type { Notice } from "../mesh/control/control";
+import { hello } from "../mesh/console/connection";
 import { operator, setOperator } from "../mesh/control/control";
 import { asker } from "../mesh/services/alarms";
 import type { NoteTime } from "../mesh/services/notes";
 import { LONGEST_TEXT, writeNote } from "../mesh/services/notes";
 import { Button } from "../ui/button";
 import { NoticeLine } from "../ui/notice-line";
+import { useOutcome } from "../ui/outcome";
+import { submit } from "../ui/submit";
 import { TextInput } from "../ui/text-input";
 import "./note-form.css";
 
@@ -25,29 +26,22 @@ export function NoteForm(props: {
   close: () => void;
 }) {
   const [text, setText] = useState("");
-  const [notice, setNotice] = useState<Notice | null>(null);
+  const { notice, isBusy, perform } = useOutcome((text) => n("not_saved", { text }));
   const input = useRef<HTMLInputElement>(null);
   useEffect(() => input.current?.focus(), []);
-  const busy = notice?.kind === "busy";
   const cannot = !mayAct.value ? n("monitor") : !asker.value ? n("name_needed") : "";
-  const save = async () => {
-    setNotice({ kind: "busy", text: n("saving") });
-    try {
+  const save = () =>
+    perform(n("saving"), async () => {
       await writeNote(props.robotKey, text.trim(), props.on());
       props.close();
-    } catch (error) {
-      setNotice({ kind: "refused", text: n("not_saved", { text: reasonOf(error) }) });
-    }
-  };
+      return undefined;
+    });
   return (
     <form
       class="note-form grid gap-8 pad-8-16"
       aria-label={n("note")}
       onKeyDown={(event) => event.key === "Escape" && props.close()}
-      onSubmit={(event) => {
-        event.preventDefault();
-        if (!busy && !cannot && text.trim()) void save();
-      }}
+      onSubmit={submit(() => !isBusy && !cannot && text.trim() && void save())}
     >
       <TextInput
         ref={input}
@@ -71,7 +65,7 @@ export function NoteForm(props: {
       <div class="note-row row wrap to-end gap-8">
         <NoticeLine notice={notice} idle={cannot} />
         <Button text={t("cancel")} type="button" onClick={props.close} />
-        <Button primary text={n("save")} type="submit" disabled={busy || cannot !== "" || !text.trim()} />
+        <Button primary text={n("save")} type="submit" disabled={isBusy || cannot !== "" || !text.trim()} />
       </div>
     </form>
   );

@@ -206,12 +206,8 @@ export function SceneView(props: {
           choose={setView}
         />
         <div class="scene-toggles">
-          <Toggle on={trail} set={setTrail}>
-            {t("show_trail")}
-          </Toggle>
-          <Toggle on={frames} set={setFrames}>
-            {t("show_frames")}
-          </Toggle>
+          <Toggle text={t("show_trail")} on={trail} set={setTrail} />
+          <Toggle text={t("show_frames")} on={frames} set={setFrames} />
         </div>
       </div>
       {replayed && <span class="replay-mark">{t("replay")}</span>}

@@ -1,7 +1,5 @@
 // Buttons that choose one of several values, or switch one thing on and off; in a form they do not submit it.
 
-import type { ComponentChildren } from "preact";
-
 /** Buttons, one of which is chosen. */
 export function Choice<Value extends string>(props: {
   label: string;
@@ -21,10 +19,16 @@ export function Choice<Value extends string>(props: {
   );
 }
 
-export function Toggle(props: { on: boolean; set: (on: boolean) => void; children: ComponentChildren }) {
+export function Toggle(props: { text: string; on: boolean; set: (on: boolean) => void; label?: string }) {
   return (
-    <button type="button" class="toggle" aria-pressed={props.on} onClick={() => props.set(!props.on)}>
-      {props.children}
+    <button
+      type="button"
+      class="toggle"
+      aria-pressed={props.on}
+      aria-label={props.label}
+      onClick={() => props.set(!props.on)}
+    >
+      {props.text}
     </button>
   );
 }

@@ -4,6 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n/texts";
 import { Button } from "./button";
+import { submit } from "./submit";
 import { TextInput } from "./text-input";
 
 export function ReasonForm(props: {
@@ -34,12 +35,11 @@ export function ReasonForm(props: {
       class="reason"
       aria-label={props.title}
       onKeyDown={(event) => event.key === "Escape" && props.close()}
-      onSubmit={(event) => {
-        event.preventDefault();
+      onSubmit={submit(() => {
         if (missing) return;
         props.close();
         props.done(reason.trim());
-      }}
+      })}
     >
       <p>{props.text}</p>
       {props.children}

@@ -7,6 +7,7 @@ import { endedBy, me, signIn } from "../../mesh/console/account";
 import { RefusedRequest } from "../../mesh/console/refusal";
 import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";
+import { submit } from "../../ui/submit";
 import { TextInput } from "../../ui/text-input";
 import { switchTheme, theme } from "../../ui/theme";
 import "../../panels/account-form.css";
@@ -43,12 +44,7 @@ export function SignIn() {
         <Button quiet text={t("language")} onClick={() => switchLanguage()} title={t("language_hint")} />
         <Button quiet text={t(theme.value === "dark" ? "theme_light" : "theme_dark")} onClick={switchTheme} />
       </p>
-      <form
-        onSubmit={(event) => {
-          event.preventDefault();
-          void send();
-        }}
-      >
+      <form onSubmit={submit(() => void send())}>
         <h1>{how ? a("to_site", { site: how.site }) : "\u00a0"}</h1>
         {endedBy.value && (
           <div class={`sign-in-ended ${endedBy.value === "signed_out" ? "" : "warning"}`} role="status">

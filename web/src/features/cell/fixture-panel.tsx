@@ -133,11 +133,10 @@ function FloorPanel({ floor }: { floor: CellFloor }) {
   return (
     <Panel title={c("floor")} name="cell-numbers">
       <div class="flex wrap gap-8 pad-8-16">
-        <Toggle on={!floor.none} set={(on) => set((each) => (each.none = !on))}>
-          {c("has_floor")}
-        </Toggle>
+        <Toggle text={c("has_floor")} on={!floor.none} set={(on) => set((each) => (each.none = !on))} />
         {!floor.none && (
           <Toggle
+            text={c("own_height")}
             on={floor.height !== undefined}
             set={(on) =>
               set((each) => {
@@ -145,9 +144,7 @@ function FloorPanel({ floor }: { floor: CellFloor }) {
                 else delete each.height;
               })
             }
-          >
-            {c("own_height")}
-          </Toggle>
+          />
         )}
       </div>
       {!floor.none && floor.height !== undefined && (

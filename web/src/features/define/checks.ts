@@ -2,6 +2,7 @@
 
 import { computed, effect, signal } from "@preact/signals";
 import { defineText as d } from "../../i18n/texts";
+import { reasonOf } from "../../mesh/console/connection";
 import { RefusedRequest } from "../../mesh/console/refusal";
 import { bodies } from "./description";
 import type { Draft } from "./draft";
@@ -114,7 +115,7 @@ async function ask(of: Draft, joints: readonly number[]): Promise<void> {
   } catch (error) {
     if (own.signal.aborted) return;
     checked.value = null;
-    checkError.value = error instanceof Error ? error.message : String(error);
+    checkError.value = reasonOf(error);
     // Retry: the console may come back without any typing.
     if (error instanceof RefusedRequest && (error.status === 0 || error.status >= 500)) {
       clearTimeout(timer);

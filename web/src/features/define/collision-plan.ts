@@ -1,6 +1,7 @@
 // How each pair of the draft's links is checked, computed by the server as by `robomesh robot check`.
 
 import { computed, effect, signal } from "@preact/signals";
+import { reasonOf } from "../../mesh/console/connection";
 import { concise, linkNames } from "./description";
 import type { Draft } from "./draft";
 import { draft, identity, isOpen } from "./draft";
@@ -116,7 +117,7 @@ async function work(): Promise<void> {
     if (isOpen(of))
       plan.value = { subject: own, id: of.id, pairs: pairs.sort((one, other) => rank(one) - rank(other)) };
   } catch (error) {
-    if (isOpen(of)) failure.value = { subject: own, text: error instanceof Error ? error.message : String(error) };
+    if (isOpen(of)) failure.value = { subject: own, text: reasonOf(error) };
   }
   if (working.value === of.id) working.value = "";
 }

@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import type { TransformControls } from "three/addons/controls/TransformControls.js";
 import { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
+import { reasonOf } from "../../mesh/console/connection";
 import { DrawLoop } from "../../scene/canvas/draw-loop";
 import { Viewpoint } from "../../scene/canvas/viewpoint";
 import {
@@ -197,7 +198,7 @@ export class DefineScene {
           this.events.failed(wanted, "");
         } catch (error) {
           if (link.glb === wanted) link.glb = ""; // retried when shown again
-          this.events.failed(wanted, error instanceof Error ? error.message : String(error));
+          this.events.failed(wanted, reasonOf(error));
         }
         const now = this.picture?.shapes[this.links.indexOf(link)];
         if (now && link.model) link.model.scale.setScalar(now.scale);

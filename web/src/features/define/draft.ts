@@ -1,6 +1,7 @@
 // The draft being defined, its undo and redo, and how it survives a reload.
 
 import { batch, computed, effect, signal } from "@preact/signals";
+import { undoHistory } from "../../ui/undo-history";
 import type { Description } from "./description";
 
 /** The editable state, which undo restores. */
@@ -39,14 +40,12 @@ const MAX_UNDO_STEPS = 500;
 
 export const draft = signal<Draft | null>(null);
 export const identity = signal<Identity>(newIdentity());
-const past = signal<readonly Draft[]>([]);
-const future = signal<readonly Draft[]>([]);
+const undoSteps = undoHistory<Draft>(MAX_UNDO_STEPS);
+export const { canUndo, canRedo } = undoSteps;
 /** When the draft that a reload restored was last changed; null: none was restored. */
 export const restoredFrom = signal<number | null>(null);
 let undoGroup = "";
 
-export const canUndo = computed(() => past.value.length > 0);
-export const canRedo = computed(() => future.value.length > 0);
 export const isUnsaved = computed(() => draft.value !== null && textOf(draft.value) !== identity.value.saved);
 
 function newIdentity(): Identity {
@@ -70,9 +69,8 @@ export function editDraft(change: (draft: Draft) => void, as = ""): void {
   const after = structuredClone(before);
   change(after);
   if (textOf(after) === textOf(before)) return;
-  if (!as || as !== undoGroup) past.value = [...past.value, before].slice(-MAX_UNDO_STEPS);
+  undoSteps.keep(before, as !== "" && as === undoGroup);
   undoGroup = as;
-  future.value = [];
   draft.value = after;
 }
 
@@ -111,22 +109,13 @@ export function endUndoStep(): void {
   undoGroup = "";
 }
 
-export function undo(): void {
-  step(past, future);
-}
+export const undo = () => step(undoSteps.undo);
+export const redo = () => step(undoSteps.redo);
 
-export function redo(): void {
-  step(future, past);
-}
-
-function step(from: typeof past, to: typeof past): void {
-  const before = draft.value;
-  const after = from.value.at(-1);
-  if (!before || !after) return;
+function step(go: (now: Draft) => Draft | undefined): void {
+  if (!draft.value) return;
   endUndoStep();
-  from.value = from.value.slice(0, -1);
-  to.value = [...to.value, before];
-  draft.value = after;
+  draft.value = go(draft.value) ?? draft.value;
 }
 
 /** Open a draft.
@@ -149,8 +138,7 @@ export function openDraft(with_: Draft, owner = "", origin: "library" | "site" |
 function replaceDraft(shown: Draft, of: Identity, at: number | null = null): void {
   batch(() => {
     endUndoStep();
-    past.value = [];
-    future.value = [];
+    undoSteps.clear();
     restoredFrom.value = at;
     identity.value = of;
     draft.value = shown;

@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { defineText as d } from "../../i18n/texts";
+import { reasonOf } from "../../mesh/console/connection";
 import type { Body, Description } from "./description";
 import { complete, empty, radians, tidy } from "./description";
 import type { Draft, Identity } from "./draft";
@@ -65,7 +66,7 @@ function enqueue(read: () => Promise<void>): Promise<void> {
     try {
       await read();
     } catch (error) {
-      notice("refused", d("not_done", { text: errorText(error) }));
+      notice("refused", d("not_done", { text: reasonOf(error) }));
     }
     reading.value = "";
   });
@@ -76,16 +77,12 @@ function isClosed(): boolean {
   return target !== null && !isOpen(target);
 }
 
-function errorText(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
-}
-
 function notice(kind: Notice["kind"], text: string): void {
   if (!isClosed()) fileNotices.value = [...fileNotices.value, { kind, text }];
 }
 
 function refuse(name: string, error: unknown): void {
-  notice("refused", d("file_refused", { name, text: errorText(error) }));
+  notice("refused", d("file_refused", { name, text: reasonOf(error) }));
 }
 
 /** Return files of the file dialog, which have no folders. */

@@ -4,6 +4,7 @@ import { signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
+import { Panel } from "../../ui/panel";
 import { problemsAt } from "./checks";
 import type { Description, Joint } from "./description";
 import { linkName } from "./description";
@@ -139,15 +140,14 @@ export function KinematicChain() {
   if (!now) return null;
   const { joint: joints, base } = now.description;
   const count = joints.length;
-  const selected = typeof chosenPart.value === "number" ? chosenPart.value : null;
+  const isJoint = typeof chosenPart.value === "number";
+  const at = isJoint ? (chosenPart.value as number) : 0;
   return (
-    <section class="panel chain" aria-label={d("chain")}>
-      <div class="panel-head">
-        <h2>{d("chain")}</h2>
-        <button class="quiet" onClick={() => add(count)}>
-          + {d("add_joint")}
-        </button>
-      </div>
+    <Panel
+      name="chain"
+      title={d("chain")}
+      end={<Button quiet text={`+ ${d("add_joint")}`} onClick={() => add(count)} />}
+    >
       <ol class="chain-list scroll pad-0-8 anchor" aria-label={d("chain")} title={d("chain_hint")}>
         <Row
           part="base"
@@ -201,34 +201,22 @@ export function KinematicChain() {
         {announced.value}
       </p>
       <div class="chain-tools flex ruled pad-4-8" role="group" aria-label={d("chain_tools")}>
-        <Button
-          quiet
-          text={d("insert")}
-          disabled={selected === null}
-          title={d("insert_before")}
-          onClick={() => add(selected ?? 0)}
-        />
-        <button
-          class="quiet sign"
-          disabled={selected === null || selected === 0}
-          aria-label={d("move_up")}
-          title={`${d("move_up")} (Alt+↑)`}
-          onClick={() => move(selected ?? 0, (selected ?? 0) - 1, count)}
-        >
-          ↑
-        </button>
-        <button
-          class="quiet sign"
-          disabled={selected === null || selected === count - 1}
-          aria-label={d("move_down")}
-          title={`${d("move_down")} (Alt+↓)`}
-          onClick={() => move(selected ?? 0, (selected ?? 0) + 1, count)}
-        >
-          ↓
-        </button>
-        <Button quiet text={d("remove")} disabled={selected === null} onClick={() => remove(selected ?? 0, count)} />
+        <Button quiet text={d("insert")} disabled={!isJoint} title={d("insert_before")} onClick={() => add(at)} />
+        {([-1, 1] as const).map((by) => (
+          <button
+            key={by}
+            class="quiet sign"
+            disabled={!isJoint || at + by < 0 || at + by >= count}
+            aria-label={d(by < 0 ? "move_up" : "move_down")}
+            title={by < 0 ? `${d("move_up")} (Alt+↑)` : `${d("move_down")} (Alt+↓)`}
+            onClick={() => move(at, at + by, count)}
+          >
+            {by < 0 ? "↑" : "↓"}
+          </button>
+        ))}
+        <Button quiet text={d("remove")} disabled={!isJoint} onClick={() => remove(at, count)} />
       </div>
-    </section>
+    </Panel>
   );
 }
 

@@ -1,6 +1,7 @@
 // Contents of the draft's mesh files, read by the server once for each content.
 
 import { effect, signal } from "@preact/signals";
+import { reasonOf } from "../../mesh/console/connection";
 import { bodies } from "./description";
 import { draft } from "./draft";
 import { resolvePath } from "./paths";
@@ -31,7 +32,7 @@ export async function readShape(path: string, files: Readonly<Record<string, str
   try {
     shape = { info: await mesh(path, files) };
   } catch (error) {
-    shape = { error: error instanceof Error ? error.message : String(error) };
+    shape = { error: reasonOf(error) };
   }
   setShape(path, files, shape);
   return shape;

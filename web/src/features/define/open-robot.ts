@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { defineText as d } from "../../i18n/texts";
+import { reasonOf } from "../../mesh/console/connection";
 import { complete } from "./description";
 import { closeDraft, deleteDraft, identity, isOpen, openDraft, restoreDraft } from "./draft";
 import { fileNotices, waitingUrdf } from "./dropped-files";
@@ -35,7 +36,7 @@ export async function openRobot(name: string): Promise<void> {
     fileNotices.value = notes.map((text) => ({ kind: "done", text }));
   } catch (error) {
     if (!isOpen(place)) return;
-    const text = error instanceof Error ? error.message : String(error);
+    const text = reasonOf(error);
     outcome.value = { kind: "refused", text: d("not_loaded", { name, text }) };
   } finally {
     if (isOpen(place)) loading.value = "";

@@ -4,6 +4,7 @@ import { Matrix4 } from "three";
 import { defineText as d } from "../../i18n/texts";
 import { Button } from "../../ui/button";
 import { numberText } from "../../ui/number-text";
+import { Panel } from "../../ui/panel";
 import { Unit } from "../../ui/unit";
 import { checkError, checked, checking } from "./checks";
 import type { Joint, Units } from "./description";
@@ -24,10 +25,11 @@ export function PositionsPanel() {
   if (!now) return null;
   const { joint: joints, units } = now.description;
   return (
-    <section class="panel positions" aria-label={d("joints")}>
-      <div class="panel-head">
-        <h2>{d("joints")}</h2>
-        <div class="panel-end">
+    <Panel
+      name="positions"
+      title={d("joints")}
+      end={
+        <>
           <Button
             quiet
             text={d("home_from")}
@@ -44,8 +46,9 @@ export function PositionsPanel() {
             disabled={joints.length === 0}
             onClick={() => (sliderPositions.value = new Map())}
           />
-        </div>
-      </div>
+        </>
+      }
+    >
       <div class="sliders grid scroll gap-0-8 pad-0-16">
         {joints.length === 0 && <p class="dim">{d("no_joints")}</p>}
         {joints.map((joint, index) => (
@@ -53,7 +56,7 @@ export function PositionsPanel() {
         ))}
       </div>
       <ToolAt />
-    </section>
+    </Panel>
   );
 }
 

@@ -1,6 +1,7 @@
 // The draft's problems in the server's words; a click opens the field.
 
 import { defineText as d } from "../../i18n/texts";
+import { Panel } from "../../ui/panel";
 import { checkError, checked, checking, problems, readingShapes } from "./checks";
 import { openField } from "./selection";
 
@@ -9,15 +10,15 @@ export function ProblemsPanel() {
   const busy = checking.value || readingShapes.value;
   const count = found.length === 1 ? d("problem_one") : d("problems", { count: found.length });
   return (
-    <section class="panel checks" aria-label={d("checks")}>
-      <div class="panel-head">
-        <h2>{d("checks")}</h2>
-        <div class="panel-end">
-          <span class="dim small" role="status">
-            {busy ? d("checking") : found.length > 0 ? count : ""}
-          </span>
-        </div>
-      </div>
+    <Panel
+      name="checks"
+      title={d("checks")}
+      end={
+        <span class="dim small" role="status">
+          {busy ? d("checking") : found.length > 0 ? count : ""}
+        </span>
+      }
+    >
       <div class="check-list scroll tall-40">
         {checkError.value && <p class="problem-word">{d("check_failed", { text: checkError.value })}</p>}
         {checked.value && !readingShapes.value && found.length === 0 && <p class="dim small">{d("no_problems")}</p>}
@@ -32,6 +33,6 @@ export function ProblemsPanel() {
           </button>
         ))}
       </div>
-    </section>
+    </Panel>
   );
 }

@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { defineText as d } from "../../i18n/texts";
+import { reasonOf } from "../../mesh/console/connection";
 import { RefusedRequest } from "../../mesh/console/refusal";
 import { saveFile } from "../../ui/save-file";
 import { checked, invalidNumbers } from "./checks";
@@ -25,12 +26,8 @@ export async function listRobots(): Promise<void> {
   try {
     knownRobots.value = await server.robots();
   } catch (error) {
-    outcome.value = { kind: "refused", text: d("not_done", { text: errorText(error) }) };
+    outcome.value = { kind: "refused", text: d("not_done", { text: reasonOf(error) }) };
   }
-}
-
-function errorText(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
 }
 
 async function perform<T>(what: string, work: () => Promise<T>): Promise<T | undefined> {
@@ -40,7 +37,7 @@ async function perform<T>(what: string, work: () => Promise<T>): Promise<T | und
   try {
     return await work();
   } catch (error) {
-    outcome.value = { kind: "refused", text: d("not_done", { text: errorText(error) }) };
+    outcome.value = { kind: "refused", text: d("not_done", { text: reasonOf(error) }) };
     return undefined;
   } finally {
     busy.value = "";

@@ -144,12 +144,8 @@ export function ScenePanel() {
           choose={(name) => (requestedView.value = { name })}
         />
         <div class="scene-toggles">
-          <Toggle on={rows} set={setRows}>
-            {d("show_rows")}
-          </Toggle>
-          <Toggle on={shapesShown} set={setShapes}>
-            {d("show_shapes")}
-          </Toggle>
+          <Toggle text={d("show_rows")} on={rows} set={setRows} />
+          <Toggle text={d("show_shapes")} on={shapesShown} set={setShapes} />
         </div>
       </div>
       <div class="scene-foot row spread gap-8">

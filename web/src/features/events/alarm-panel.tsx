@@ -6,8 +6,7 @@ import { alarmText } from "../../i18n/alarm-text";
 import type { NameIn } from "../../i18n/texts";
 import { eventsText as e, t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/console/account";
-import { hello, reasonOf } from "../../mesh/console/connection";
-import type { Notice } from "../../mesh/control/control";
+import { hello } from "../../mesh/console/connection";
 import { operator, setOperator } from "../../mesh/control/control";
 import type { Alarm } from "../../mesh/services/alarms";
 import {
@@ -28,6 +27,7 @@ import { setSound, sound } from "../../panels/alarm-sound";
 import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import { Select } from "../../ui/select";
 import { TextInput } from "../../ui/text-input";
 import { Warning } from "../../ui/warning";
@@ -58,7 +58,7 @@ export function AlarmPanel() {
   const [order, setOrder] = useState<keyof typeof ALARM_ORDERS>("order_priority");
   const [selected, setSelected] = useState<ReadonlySet<string>>(new Set());
   const [shelving, setShelving] = useState<readonly Alarm[] | null>(null);
-  const [notice, setNotice] = useState<Notice | null>(null);
+  const { notice, perform } = useOutcome((text) => e("not_done", { text }));
 
   const all = alarms.value;
   const searchText = text.trim().toLowerCase();
@@ -75,16 +75,12 @@ export function AlarmPanel() {
   const openChosen = chosen.filter(isUnacknowledged);
   const able = mayAct.value && asker.value !== "";
 
-  const run = async (some: readonly Alarm[], action: Action, values?: { reason: string; shelveS: number }) => {
-    setNotice({ kind: "busy", text: e("acting") });
-    try {
+  const run = (some: readonly Alarm[], action: Action, values?: { reason: string; shelveS: number }) =>
+    perform(e("acting"), async () => {
       await act(some, action, values);
-      setNotice({ kind: "done", text: e(DONE.get(action) ?? "acknowledged", { count: some.length }) });
       setSelected(new Set());
-    } catch (error) {
-      setNotice({ kind: "refused", text: e("not_done", { text: reasonOf(error) }) });
-    }
-  };
+      return e(DONE.get(action) ?? "acknowledged", { count: some.length });
+    });
   const select = (alarm: Alarm, on: boolean) => {
     const names = new Set(selected);
     if (on) names.add(nameOf(alarm));
@@ -104,9 +100,7 @@ export function AlarmPanel() {
           choose={setShown}
         />
         <span class="panel-end">
-          <Toggle on={sound.value} set={setSound}>
-            {e("sound")}: {e(sound.value ? "on" : "off")}
-          </Toggle>
+          <Toggle text={`${e("sound")}: ${e(sound.value ? "on" : "off")}`} on={sound.value} set={setSound} />
         </span>
       </div>
       <div class="list-tools flex wrap spread">

@@ -141,9 +141,13 @@ export function Journal() {
             <span class="dim small">{e("shown_of", { shown: count(listed.length), all: count(all.length) })}</span>
           )}
           {kind !== "day" && (
-            <Toggle on={pausedEntries !== null} set={(on) => setPausedEntries(on ? newest : null)}>
-              {pausedEntries ? e("go_on", { count: Math.max(0, newest.length - pausedEntries.length) }) : e("pause")}
-            </Toggle>
+            <Toggle
+              text={
+                pausedEntries ? e("go_on", { count: Math.max(0, newest.length - pausedEntries.length) }) : e("pause")
+              }
+              on={pausedEntries !== null}
+              set={(on) => setPausedEntries(on ? newest : null)}
+            />
           )}
         </span>
       </div>

@@ -5,6 +5,7 @@
 import { computed, effect, signal } from "@preact/signals";
 import { programText as p } from "../../i18n/texts";
 import { saveFile } from "../../ui/save-file";
+import { undoHistory } from "../../ui/undo-history";
 
 export interface Draft {
   robotKey: string;
@@ -36,15 +37,13 @@ export const LINE_PX = 20;
 export const draft = signal<Draft | null>(null);
 /** The browser's message if it could not keep the draft; "" if it did. */
 export const storageError = signal("");
-const past = signal<readonly Step[]>([]);
-const future = signal<readonly Step[]>([]);
+const undoSteps = undoHistory<Step>(MOST_STEPS);
+export const { canUndo, canRedo } = undoSteps;
 /** Whether the draft differs from the version that it is based on. */
 export const isUnsaved = computed(() => {
   const now = draft.value;
   return now !== null && (now.text !== (now.base?.text ?? "") || (now.base !== null && now.name !== now.base.name));
 });
-export const canUndo = computed(() => past.value.length > 0);
-export const canRedo = computed(() => future.value.length > 0);
 
 let field: HTMLTextAreaElement | null = null;
 let typedAt = 0;
@@ -53,7 +52,7 @@ let typedAt = 0;
 export function openDraft(robotKey: string): boolean {
   const kept = storedDraft(robotKey);
   draft.value = kept ?? { robotKey, name: p("default_name"), text: "", base: null };
-  past.value = future.value = [];
+  undoSteps.clear();
   return kept !== null;
 }
 
@@ -149,28 +148,17 @@ function changeText(text: string, together: boolean): void {
 
 /** `together`: part of the previous step. */
 function change(after: Draft, together: boolean): void {
-  const before = draft.value;
-  if (!before) return;
-  if (!together || !canUndo.value) {
-    past.value = [...past.value, { draft: before, cursor: field?.selectionStart ?? 0 }].slice(-MOST_STEPS);
-  }
-  future.value = [];
+  if (!draft.value) return;
+  undoSteps.keep({ draft: draft.value, cursor: field?.selectionStart ?? 0 }, together && canUndo.value);
   draft.value = after;
 }
 
-export function undo(): void {
-  step(past, future);
-}
+export const undo = () => step(undoSteps.undo);
+export const redo = () => step(undoSteps.redo);
 
-export function redo(): void {
-  step(future, past);
-}
-
-function step(from: typeof past, to: typeof past): void {
-  const after = from.value.at(-1);
-  if (!field || !draft.value || !after) return;
-  from.value = from.value.slice(0, -1);
-  to.value = [...to.value, { draft: draft.value, cursor: field.selectionStart }];
+function step(go: (now: Step) => Step | undefined): void {
+  const after = field && draft.value && go({ draft: draft.value, cursor: field.selectionStart });
+  if (!draft.value || !after) return;
   // A version that was saved since then stays saved.
   const saved = draft.value.base && draft.value.base.id === after.draft.base?.id ? draft.value.base : after.draft.base;
   draft.value = { ...after.draft, base: saved };

@@ -7,6 +7,7 @@ import { storedText as s, t } from "../../i18n/texts";
 import { mayAct } from "../../mesh/console/account";
 import { Button } from "../../ui/button";
 import { ReasonForm } from "../../ui/reason-form";
+import { submit } from "../../ui/submit";
 import { TextInput } from "../../ui/text-input";
 import { Difference } from "./difference";
 import { download, draft } from "./draft";
@@ -47,11 +48,10 @@ export function Versions(props: {
       {form === "rename" && (
         <form
           class="stored-rename flex wrap gap-8"
-          onSubmit={(event) => {
-            event.preventDefault();
+          onSubmit={submit(() => {
             setForm("");
             void rename(robotKey, program, name);
-          }}
+          })}
         >
           <TextInput maxLength={60} aria-label={s("new_name")} value={name} set={setName} />
           <Button text={t("cancel")} type="button" onClick={() => setForm("")} />

@@ -59,9 +59,7 @@ function List({ robotKey }: { robotKey: string }) {
   return (
     <>
       <div class="stored-tools">
-        <Toggle on={deletedToo} set={setDeletedToo}>
-          {s("show_deleted")}
-        </Toggle>
+        <Toggle text={s("show_deleted")} on={deletedToo} set={setDeletedToo} />
         <FileButton
           label={s("import")}
           disabled={!mayAct.value || !stored.value}

@@ -81,9 +81,7 @@ export function PlaybackControls(props: {
               choose={(each) => replay.setSpeed(Number(each))}
             />
           </label>
-          <Toggle on={loop} set={replay.setLoop}>
-            {r("loop")}
-          </Toggle>
+          <Toggle text={r("loop")} on={loop} set={replay.setLoop} />
         </div>
       </div>
       <p class="transport-words small">

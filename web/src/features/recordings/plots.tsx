@@ -82,9 +82,7 @@ export function Plots(props: {
           >
             {r("save_picture")}
           </button>
-          <Toggle on={choosing} set={setChoosing}>
-            {r(choosing ? "done" : "values")}
-          </Toggle>
+          <Toggle text={r(choosing ? "done" : "values")} on={choosing} set={setChoosing} />
         </>
       }
     >

@@ -19,10 +19,10 @@ import {
 } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
 import { mayAct } from "../../mesh/console/account";
-import { reasonOf } from "../../mesh/console/connection";
 import { Action, askRecorder } from "../../mesh/services/recorder";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import type { RecordingName } from "../../ui/route";
 import { recordingsLink } from "../../ui/route";
 import { Silhouette } from "../../ui/silhouette";
@@ -153,28 +153,22 @@ function Choose({ row, name, chosen }: { row: Row; name: string; chosen: Signal<
 
 /** Stops the recording, as the button of its robot does. */
 function Stop({ row, name }: { row: Row; name: string }) {
-  const [busy, setBusy] = useState(false);
-  const [problem, setProblem] = useState("");
-  const stop = async () => {
-    setBusy(true);
-    setProblem("");
-    try {
+  const { notice, isBusy, perform } = useOutcome((text) => r("not_done", { text }));
+  const stop = () =>
+    perform("", async () => {
       await askRecorder(`robomesh/${row.site}/${row.recording.robot}`, Action.TRACE_OFF);
       refreshSite(row.site);
-    } catch (error) {
-      setProblem(r("not_done", { text: reasonOf(error) }));
-    }
-    setBusy(false);
-  };
+      return undefined;
+    });
   return (
     <>
       <Button
         text={r("stop_recording")}
-        disabled={busy}
+        disabled={isBusy}
         aria-label={r("stop_of", { name })}
         onClick={() => void stop()}
       />
-      {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
+      {notice && <NoticeLine notice={notice} />}
     </>
   );
 }

@@ -2,10 +2,11 @@
 
 import { useState } from "preact/hooks";
 import { recordingsText as r } from "../../i18n/texts";
-import { reasonOf } from "../../mesh/console/connection";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import { ReasonForm } from "../../ui/reason-form";
+import { submit } from "../../ui/submit";
 import { TextInput } from "../../ui/text-input";
 import { deleteRecording, saveLabels } from "./recording-changes";
 import type { Row } from "./recordings-of-sites";
@@ -19,37 +20,28 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
   const [name, setName] = useState(seen.recording.name);
   const [note, setNote] = useState(seen.recording.note);
   const [tags, setTags] = useState(seen.recording.tags.join(", "));
-  const [busy, setBusy] = useState(false);
-  const [problem, setProblem] = useState("");
+  const { notice, isBusy, perform } = useOutcome((text) => r("not_changed", { text }));
   const [deleting, setDeleting] = useState(false);
   const title = seen.recording.name || seen.recording.file;
-  const attempt = async (work: Promise<void>) => {
-    setBusy(true);
-    setProblem("");
-    try {
-      await work;
+  const attempt = (work: () => Promise<void>) =>
+    void perform("", async () => {
+      await work();
       close();
-    } catch (error) {
-      setProblem(r("not_changed", { text: reasonOf(error) }));
-    }
-    setBusy(false);
-  };
+      return undefined;
+    });
   const save = () => {
     const list = tags
       .split(/[,，]/)
       .map((each) => each.trim())
       .filter(Boolean);
-    void attempt(saveLabels(seen, { name: name.trim(), note: note.trim(), tags: list }));
+    attempt(() => saveLabels(seen, { name: name.trim(), note: note.trim(), tags: list }));
   };
   return (
     <div class="recording-editor whole-row ruled">
       <form
         aria-label={r("edit_of", { name: title })}
         onKeyDown={(event) => event.key === "Escape" && close()}
-        onSubmit={(event) => {
-          event.preventDefault();
-          save();
-        }}
+        onSubmit={submit(save)}
       >
         <label>
           <span class="dim small">{r("name")}</span>
@@ -69,10 +61,10 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
           />
         </label>
         <div class="whole-row flex wrap gap-8">
-          <Button primary text={r("save")} type="submit" disabled={busy || !name.trim()} />
-          <Button text={r("cancel")} type="button" disabled={busy} onClick={close} />
+          <Button primary text={r("save")} type="submit" disabled={isBusy || !name.trim()} />
+          <Button text={r("cancel")} type="button" disabled={isBusy} onClick={close} />
           {!seen.recording.open && (
-            <button type="button" class="action push" disabled={busy} onClick={() => setDeleting(true)}>
+            <button type="button" class="action push" disabled={isBusy} onClick={() => setDeleting(true)}>
               {r("delete")}
             </button>
           )}
@@ -85,10 +77,10 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
           does={r("delete_now")}
           required
           close={() => setDeleting(false)}
-          done={(reason) => void attempt(deleteRecording(seen, reason))}
+          done={(reason) => attempt(() => deleteRecording(seen, reason))}
         />
       )}
-      {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
+      {notice && <NoticeLine notice={notice} />}
     </div>
   );
 }

@@ -4,12 +4,11 @@ import { signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { robotsOf, sizeText, startMs } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
-import { reasonOf } from "../../mesh/console/connection";
-import type { Notice } from "../../mesh/control/control";
 import { Action, askRecorder } from "../../mesh/services/recorder";
 import { fleetRobots } from "../../mesh/state/known-robots";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import type { RecordingName } from "../../ui/route";
 import { Select } from "../../ui/select";
 import { TextInput } from "../../ui/text-input";
@@ -130,24 +129,17 @@ function countText(shown: number, count: number): string {
 
 /** State of a site's recorder: free space, flight recorder, problems. */
 function SiteLine({ site, answer: { list, problem }, named }: { site: string; answer: SiteAnswer; named: boolean }) {
-  const [notice, setNotice] = useState<Notice | null>(null);
+  const { notice, isBusy, perform } = useOutcome((text) => r("not_saved", { text }));
   const [of, setOf] = useState("");
   const robots = fleetRobots.value
     .filter((key) => key.startsWith(`robomesh/${site}/`))
     .map((key) => key.split("/")[2] ?? "");
   const chosen = robots.includes(of) ? of : (robots[0] ?? "");
-  const save = async () => {
-    setNotice({ kind: "busy", text: r("saving", { robot: chosen }) });
-    try {
+  const save = () =>
+    perform(r("saving", { robot: chosen }), async () => {
       const { name } = await askRecorder(`robomesh/${site}/${chosen}`, Action.SAVE);
-      setNotice({ kind: "done", text: r("saved", { robot: chosen, name }) });
-    } catch (error) {
-      setNotice({
-        kind: "refused",
-        text: r("not_saved", { text: reasonOf(error) }),
-      });
-    }
-  };
+      return r("saved", { robot: chosen, name });
+    });
   const free = list?.freeBytes ?? 0n;
   const low = free < LOW_BYTES;
   const full = free < FULL_BYTES;
@@ -174,7 +166,7 @@ function SiteLine({ site, answer: { list, problem }, named }: { site: string; an
               )}
               <Button
                 text={robots.length > 1 ? r("save_last") : r("save_of", { robot: chosen })}
-                disabled={notice?.kind === "busy"}
+                disabled={isBusy}
                 onClick={() => void save()}
               />
             </span>

@@ -2,6 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n/texts";
+import { reasonOf } from "../../mesh/console/connection";
 import { readRefusal } from "../../mesh/console/refusal";
 import { saveFile } from "../../ui/save-file";
 
@@ -73,8 +74,7 @@ export function useRecording(address: string, name: string): VideoRecording {
       }
       stop.abort();
     } catch (error) {
-      if (!stop.signal.aborted)
-        setProblem(t("record_failed", { text: error instanceof Error ? error.message : String(error) }));
+      if (!stop.signal.aborted) setProblem(t("record_failed", { text: reasonOf(error) }));
     }
     end.current = null;
     setSince(null);

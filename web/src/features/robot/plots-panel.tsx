@@ -68,9 +68,7 @@ export function PlotsPanel(props: {
               {p("paused_at", { time: whenText(Date.now() - ageClock() + pausedAt * 1000) })}
             </span>
           )}
-          <Toggle on={pausedAt !== null} set={(on) => setPausedAt(on ? ageClock() / 1000 : null)}>
-            {p("pause")}
-          </Toggle>
+          <Toggle text={p("pause")} on={pausedAt !== null} set={(on) => setPausedAt(on ? ageClock() / 1000 : null)} />
           <button
             class="toggle"
             disabled={plots.length >= MOST_PLOTS}
@@ -142,14 +140,7 @@ function PlotCard(props: {
             text={(each) => rangeText(Number(each))}
             choose={(each) => props.change({ seconds: Number(each) })}
           />
-          <button
-            class="toggle"
-            aria-pressed={choosing}
-            aria-label={p("fields_of", { number })}
-            onClick={() => setChoosing(!choosing)}
-          >
-            {p("fields")}
-          </button>
+          <Toggle text={p("fields")} label={p("fields_of", { number })} on={choosing} set={setChoosing} />
           <button class="quiet plot-remove" aria-label={p("remove", { number })} onClick={() => props.change(null)}>
             <span aria-hidden="true">×</span>
           </button>

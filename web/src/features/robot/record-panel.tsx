@@ -9,13 +9,15 @@ import { ageText, count } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
 import { durationS, lostText, messagesOf, momentText, sizeText, startedText } from "../../i18n/recording-format";
 import { recordingsText as r, viewText } from "../../i18n/texts";
-import { presence, reasonOf } from "../../mesh/console/connection";
+import { presence } from "../../mesh/console/connection";
 import { Action, askRecorder } from "../../mesh/services/recorder";
 import { ageOf, isStale, useTopic } from "../../mesh/state/topics";
 import { viewsOf } from "../../scene/scene-view";
 import { Button } from "../../ui/button";
+import { useOutcome } from "../../ui/outcome";
 import { recordingsLink } from "../../ui/route";
 import { Select } from "../../ui/select";
+import { submit } from "../../ui/submit";
 import { TextInput } from "../../ui/text-input";
 import "../../ui/replay.css";
 import "./record-panel.css";
@@ -62,21 +64,10 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
   const [, site = ""] = robotKey.split("/");
   const { recording, open, staleFor } = useRecording(robotKey);
   const there = [...presence.value].some((key) => key.startsWith(`robomesh/${site}/-/alive/recorder/`));
-  const [notice, setNotice] = useState<{ kind: "busy" | "refused"; text: string } | null>(null);
-  const does = async (action: Action, busy: string, values = {}) => {
-    setNotice({ kind: "busy", text: busy });
-    try {
-      await askRecorder(robotKey, action, values);
-      setNotice(null);
-    } catch (error) {
-      setNotice({
-        kind: "refused",
-        text: r("not_done", { text: reasonOf(error) }),
-      });
-    }
-  };
+  const { notice, isBusy, perform } = useOutcome((text) => r("not_done", { text }));
+  const does = (action: Action, busy: string, values = {}) =>
+    perform(busy, async () => void (await askRecorder(robotKey, action, values)));
   if (!shown.value) return null;
-  const busy = notice?.kind === "busy";
   const words =
     notice?.text ??
     (!there ? r("record_gone") : staleFor !== null ? r("record_stale", { age: ageText(staleFor) }) : "");
@@ -88,7 +79,7 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
           <Counts recording={recording} />
           <Button
             text={r("record_stop")}
-            disabled={busy}
+            disabled={isBusy}
             onClick={() => void does(Action.TRACE_OFF, r("record_stopping"))}
           />
         </div>
@@ -96,13 +87,13 @@ export function RecordPanel({ robotKey, description }: { robotKey: string; descr
         <Start
           last={<Last site={site} recording={recording} />}
           description={description}
-          busy={busy}
+          busy={isBusy}
           start={(name, views) => void does(Action.TRACE_ON, r("record_starting"), { name, views })}
         />
       )}
       {words && (
         <p class={`notice ${notice?.kind ?? ""}`} role={notice?.kind === "refused" ? "alert" : "status"}>
-          {!busy && <span class="shape warning" aria-hidden="true" />}
+          {!isBusy && <span class="shape warning" aria-hidden="true" />}
           {words}
         </p>
       )}
@@ -121,10 +112,7 @@ function Start(props: {
   return (
     <form
       class="record-row row wrap gap-8-16 pad-8-16"
-      onSubmit={(event) => {
-        event.preventDefault();
-        props.start(name.trim().replace(/\s+/g, "-"), views ? [views] : []);
-      }}
+      onSubmit={submit(() => props.start(name.trim().replace(/\s+/g, "-"), views ? [views] : []))}
     >
       <TextInput
         maxLength={80}

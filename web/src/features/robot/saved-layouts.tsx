@@ -6,14 +6,15 @@ import { LayoutRequest_Action as Action, LayoutListSchema, LayoutRequestSchema }
 import { stampFull } from "../../i18n/format";
 import { plotsText as p } from "../../i18n/texts";
 import { mayAct } from "../../mesh/console/account";
-import { ask, reasonOf } from "../../mesh/console/connection";
-import type { Notice } from "../../mesh/control/control";
+import { ask } from "../../mesh/console/connection";
 import { asker } from "../../mesh/services/alarms";
 import { useTopic } from "../../mesh/state/topics";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import { setLayoutQuery } from "../../ui/route";
 import { Select } from "../../ui/select";
+import { submit } from "../../ui/submit";
 import { TextInput } from "../../ui/text-input";
 
 const TIMEOUT_S = 10; // the answer waits for the disk
@@ -26,7 +27,7 @@ export function SavedLayouts(props: { site: string; text: string }) {
   const [chosen, setChosen] = useState("");
   const [name, setName] = useState("");
   const [deleting, setDeleting] = useState(false);
-  const [notice, setNotice] = useState<Notice | null>(null);
+  const { notice, setNotice, isBusy, perform } = useOutcome((why) => p("not_changed", { why }));
   const layouts = list?.layouts ?? [];
   const opened = layouts.find((each) => each.name === chosen);
   const choose = (next: string) => {
@@ -40,19 +41,14 @@ export function SavedLayouts(props: { site: string; text: string }) {
     if (same && opened?.text !== text) choose(same);
   }, [same]);
   const there = layouts.find((each) => each.name.toLowerCase() === name.trim().toLowerCase());
-  const busy = notice?.kind === "busy";
   const cannot = !list ? p("no_store") : !mayAct.value ? p("monitor") : !asker.value ? p("name_needed") : "";
-  const send = async (values: object, done: string, next: string) => {
-    setNotice({ kind: "busy", text: p("sending") });
-    try {
+  const send = (values: object, done: string, next: string) =>
+    perform(p("sending"), async () => {
       const key = `robomesh/${site}/-/layouts/request/${asker.value}`;
       await ask(key, LayoutRequestSchema, values, LayoutListSchema, TIMEOUT_S);
       choose(next);
-      setNotice({ kind: "done", text: done });
-    } catch (error) {
-      setNotice({ kind: "refused", text: p("not_changed", { why: reasonOf(error) }) });
-    }
-  };
+      return done;
+    });
   const wanted = name.trim();
   const save = () =>
     send(
@@ -63,15 +59,12 @@ export function SavedLayouts(props: { site: string; text: string }) {
   const rename = () =>
     send({ action: Action.RENAME, name: chosen, newName: wanted }, p("renamed", { old: chosen, name: wanted }), wanted);
   const remove = () => send({ action: Action.DELETE, name: chosen }, p("deleted", { name: chosen }), "");
-  const able = !cannot && !busy && wanted !== "";
+  const able = !cannot && !isBusy && wanted !== "";
   return (
     <form
       class="layout-row row wrap gap-8-16 pad-8-16 saved-layouts ruled"
       aria-label={p("saved_layouts", { site })}
-      onSubmit={(event) => {
-        event.preventDefault();
-        if (able) void save();
-      }}
+      onSubmit={submit(() => able && void save())}
     >
       <span class="layout-field">
         {p("saved_layouts", { site })}

@@ -4,11 +4,12 @@ import { useEffect, useState } from "preact/hooks";
 import { timeText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
 import { me, post } from "../../mesh/console/account";
-import type { Notice } from "../../mesh/control/control";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import { Panel } from "../../ui/panel";
 import { Select } from "../../ui/select";
+import { submit } from "../../ui/submit";
 import { TextInput } from "../../ui/text-input";
 
 type Role = "monitor" | "operator" | "engineer" | "admin";
@@ -22,26 +23,21 @@ interface Account {
   sessions: number;
 }
 
-type Change = (action: string, name: string, values?: { role?: Role; password?: string }) => Promise<void>;
+type Change = (action: string, name: string, values?: { role?: Role; password?: string }) => Promise<boolean>;
 
 export function Accounts() {
   const [accounts, setAccounts] = useState<readonly Account[]>([]);
-  const [notice, setNotice] = useState<Notice | null>(null);
+  const { notice, perform } = useOutcome((text) => s("not_done", { text }));
   useEffect(() => {
     fetch("/account/accounts", { cache: "no-store" })
       .then(async (answer) => answer.ok && setAccounts(((await answer.json()) as { accounts: Account[] }).accounts))
       .catch(() => undefined); // the page shows separately that the console is gone
   }, []);
-  const change: Change = async (action, name, values = {}) => {
-    try {
+  const change: Change = (action, name, values = {}) =>
+    perform("", async () => {
       setAccounts((await post<{ accounts: Account[] }>("accounts", { action, name, ...values })).accounts);
-      setNotice({ kind: "done", text: s("done") });
-    } catch (error) {
-      const text = error instanceof Error ? error.message : String(error);
-      setNotice({ kind: "refused", text: s("not_done", { text }) });
-      throw error;
-    }
-  };
+      return s("done");
+    });
   return (
     <Panel name="accounts" title={s("accounts")}>
       <p class="footnote dim">{s("accounts_words")}</p>
@@ -75,10 +71,7 @@ function Row({ account, change }: { account: Account; change: Change }) {
   const [openForm, setOpen] = useState<"password" | "remove" | null>(null);
   const own = name === me.value?.account; // prevents locking oneself out
   const run = (action: string, values?: { role?: Role; password?: string }) =>
-    void change(action, name, values).then(
-      () => setOpen(null),
-      () => undefined,
-    );
+    void change(action, name, values).then((isDone) => isDone && setOpen(null));
   return (
     <tr class={disabled ? "gone" : ""}>
       <th scope="row">{name}</th>
@@ -127,13 +120,7 @@ function Row({ account, change }: { account: Account; change: Change }) {
 function Password(props: { of: string; set: (password: string) => void; close: () => void }) {
   const [password, setPassword] = useState("");
   return (
-    <form
-      class="account-form row wrap gap-8"
-      onSubmit={(event) => {
-        event.preventDefault();
-        props.set(password);
-      }}
-    >
+    <form class="account-form row wrap gap-8" onSubmit={submit(() => props.set(password))}>
       <TextInput
         type="password"
         autocomplete="new-password"
@@ -153,19 +140,9 @@ function AddAccount({ change }: { change: Change }) {
   const [password, setPassword] = useState("");
   const [role, setRole] = useState<Role>("monitor");
   const add = () =>
-    void change("add", name.trim(), { role, password }).then(
-      () => (setName(""), setPassword("")),
-      () => undefined,
-    );
+    void change("add", name.trim(), { role, password }).then((isDone) => isDone && (setName(""), setPassword("")));
   return (
-    <form
-      class="account-form row wrap gap-8"
-      aria-label={s("add")}
-      onSubmit={(event) => {
-        event.preventDefault();
-        add();
-      }}
-    >
+    <form class="account-form row wrap gap-8" aria-label={s("add")} onSubmit={submit(add)}>
       <strong>{s("add")}</strong>
       <TextInput maxLength={40} hint={s("name")} value={name} set={setName} />
       <TextInput type="password" autocomplete="new-password" hint={s("password")} value={password} set={setPassword} />

@@ -4,9 +4,9 @@ import { useEffect, useState } from "preact/hooks";
 import { timeText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
 import { post } from "../../mesh/console/account";
-import type { Notice } from "../../mesh/control/control";
 import { Button } from "../../ui/button";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import { Panel } from "../../ui/panel";
 
 const REFRESH_INTERVAL_MS = 5000;
@@ -23,7 +23,7 @@ interface Session {
 
 export function Sessions() {
   const [sessions, setSessions] = useState<readonly Session[]>([]);
-  const [notice, setNotice] = useState<Notice | null>(null);
+  const { notice, perform } = useOutcome((text) => s("not_done", { text }));
   const fetchSessions = async () => {
     const answer = await fetch("/account/sessions", { cache: "no-store" });
     if (answer.ok) setSessions(((await answer.json()) as { sessions: Session[] }).sessions);
@@ -34,16 +34,12 @@ export function Sessions() {
     const timer = setInterval(refresh, REFRESH_INTERVAL_MS);
     return () => clearInterval(timer);
   }, []);
-  const end = async ({ id }: Session) => {
-    try {
+  const end = ({ id }: Session) =>
+    perform("", async () => {
       await post("sessions", { end: id });
       await fetchSessions();
-      setNotice({ kind: "done", text: s("done") });
-    } catch (error) {
-      const text = error instanceof Error ? error.message : String(error);
-      setNotice({ kind: "refused", text: s("not_done", { text }) });
-    }
-  };
+      return s("done");
+    });
   return (
     <Panel name="sessions" title={s("sessions")}>
       <p class="footnote dim">{s("sessions_words")}</p>

@@ -44,11 +44,7 @@ export function ViewChoice(props: {
             </span>
             {views.map((view) => {
               const one = { site, robot, view };
-              return (
-                <Toggle key={view} on={shown.some(is(one))} set={(on) => set(one, on)}>
-                  {viewText(view)}
-                </Toggle>
-              );
+              return <Toggle text={viewText(view)} key={view} on={shown.some(is(one))} set={(on) => set(one, on)} />;
             })}
           </div>
         ))}

@@ -3,8 +3,10 @@
 import { useState } from "preact/hooks";
 import { accountText as a } from "../../i18n/texts";
 import { isMonitor, mayAct, me, unlock } from "../../mesh/console/account";
+import { reasonOf } from "../../mesh/console/connection";
 import { Button } from "../../ui/button";
 import { PasswordField } from "../../ui/password-field";
+import { submit } from "../../ui/submit";
 import "../account-form.css";
 
 /** Return whether the signed-in account may not request control now. */
@@ -25,20 +27,13 @@ export function NoControl() {
     try {
       await unlock(password);
     } catch (error) {
-      setProblem(error instanceof Error ? error.message : String(error));
+      setProblem(reasonOf(error));
     }
     setPassword("");
     setBusy(false);
   };
   return (
-    <form
-      class="no-control pad-8-16"
-      aria-label={a("unlock")}
-      onSubmit={(event) => {
-        event.preventDefault();
-        void send();
-      }}
-    >
+    <form class="no-control pad-8-16" aria-label={a("unlock")} onSubmit={submit(() => void send())}>
       <p>{a("unlock_says")}</p>
       <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
       <PasswordField label={a("password")} kind="current-password" value={password} set={setPassword} />

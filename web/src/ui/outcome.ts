@@ -1,0 +1,31 @@
+// The outcome of what a panel's buttons request.
+
+import { useState } from "preact/hooks";
+import { reasonOf } from "../mesh/console/connection";
+import type { Notice } from "../mesh/control/control";
+
+/** Return the outcome of the newest action, and a function that performs one.
+ *
+ * @param refusal Return why it was refused, with the reason in words. */
+export function useOutcome(refusal: (text: string) => string) {
+  const [notice, setNotice] = useState<Notice | null>(null);
+  const [isBusy, setBusy] = useState(false);
+  /** @param busy What is being done in words; "": no message is needed.
+   * @param work Returns what was done in words; nothing: no message is needed.
+   * @returns Whether it succeeded. */
+  const perform = async (busy: string, work: () => Promise<string | undefined>): Promise<boolean> => {
+    setNotice(busy ? { kind: "busy", text: busy } : null);
+    setBusy(true);
+    try {
+      const done = await work();
+      setNotice(done ? { kind: "done", text: done } : null);
+      return true;
+    } catch (error) {
+      setNotice({ kind: "refused", text: refusal(reasonOf(error)) });
+      return false;
+    } finally {
+      setBusy(false);
+    }
+  };
+  return { notice, setNotice, isBusy, perform };
+}
