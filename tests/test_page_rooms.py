@@ -67,7 +67,7 @@ def test_no_rooms_import_each_other_in_a_circle():
     TopologicalSorter(rooms).prepare()
 
 
-@pytest.mark.parametrize("path", ["mesh", "scene", "i18n", "video", "panels", "app"])
+@pytest.mark.parametrize("path", ["mesh", "scene", "i18n", "video", "panels", "app", "features"])
 def test_a_room_has_few_modules(path):
     count = defaultdict(int)
     for module in imports():

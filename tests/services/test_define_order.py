@@ -34,9 +34,9 @@ def module(tmp_path_factory):
     """Return the path of the page's modules as one file for Node."""
     return page_modules.bundle(
         tmp_path_factory.mktemp("order"),
-        order="features/define/part-order.ts",
-        description="features/define/description.ts",
-        edits="features/define/edits.ts",
+        order="features/define/opening/part-order.ts",
+        description="features/define/description/description.ts",
+        edits="features/define/description/edits.ts",
     )
 
 

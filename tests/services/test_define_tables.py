@@ -37,9 +37,9 @@ def module(tmp_path_factory):
     """Return the path of the page's modules as one file for Node."""
     return page_modules.bundle(
         tmp_path_factory.mktemp("tables"),
-        text="features/define/table-text.ts",
-        fill="features/define/table-fill.ts",
-        description="features/define/description.ts",
+        text="features/define/table/table-text.ts",
+        fill="features/define/table/table-fill.ts",
+        description="features/define/description/description.ts",
     )
 
 

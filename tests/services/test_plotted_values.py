@@ -54,7 +54,7 @@ def module(tmp_path_factory):
         connection="mesh/console/connection.ts",
         gen="gen/robomesh_pb.ts",
         layout="ui/layout.ts",
-        buckets="features/robot/plot-buckets.ts",
+        buckets="features/robot/plots/plot-buckets.ts",
         pb=build_page.MODULES / "@bufbuild/protobuf/dist/esm/index.js",
     )
 

@@ -56,7 +56,7 @@ function NotLoaded() {
 // The robot's page needs three.js; the fleet's text must not wait for it.
 const RobotPage = onDemand(async () => (await import("../features/robot/robot-page")).RobotPage);
 const ReplayRobotPage = onDemand(
-  async () => (await import("../features/recordings/replay-robot-page")).ReplayRobotPage,
+  async () => (await import("../features/recordings/player/replay-robot-page")).ReplayRobotPage,
 );
 const ProgramPage = onDemand(async () => (await import("../features/program/program-page")).ProgramPage);
 const CellPage = onDemand(async () => (await import("../features/cell/cell-page")).CellPage);

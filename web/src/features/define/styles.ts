@@ -1,18 +1,18 @@
 // Style sheets of Define, in the order of the cascade: a later sheet overrides an earlier one.
 
 import "./define-page.css";
-import "./toolbar.css";
-import "./missing-files.css";
-import "./new-robot.css";
-import "./kinematic-chain.css";
-import "./problems-panel.css";
-import "./scene-panel.css";
-import "./positions-panel.css";
-import "./fields.css";
-import "./dh-table.css";
-import "./paste-table.css";
+import "./panels/toolbar.css";
+import "./opening/missing-files.css";
+import "./opening/new-robot.css";
+import "./panels/kinematic-chain.css";
+import "./panels/problems-panel.css";
+import "./scene/scene-panel.css";
+import "./panels/positions-panel.css";
+import "./draft/fields.css";
+import "./table/dh-table.css";
+import "./table/paste-table.css";
 import "./tabs.css";
-import "./part-details.css";
-import "./collisions-tab.css";
-import "./views-tab.css";
+import "./panels/part-details.css";
+import "./panels/collisions-tab.css";
+import "./panels/views-tab.css";
 import "./breakpoints.css";

@@ -15,11 +15,11 @@ import { whyNoNewMotion } from "../../mesh/state/robot-state";
 import { now } from "../../mesh/state/topics";
 import { NoticeLine } from "../../ui/notice-line";
 import { Panel } from "../../ui/panel";
-import type { Draft } from "./draft";
-import { draft } from "./draft";
-import { checked, errorsOf, isCurrent } from "./program-check";
-import { program } from "./running-program";
-import { hideMoment } from "./scene-overlay";
+import type { Draft } from "./draft/draft";
+import { draft } from "./draft/draft";
+import { checked, errorsOf, isCurrent } from "./motion/program-check";
+import { program } from "./motion/running-program";
+import { hideMoment } from "./motion/scene-overlay";
 import "./run-panel.css";
 
 export function RunPanel(props: { robotKey: string; controller: ControllerState | undefined }) {

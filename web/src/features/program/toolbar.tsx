@@ -6,10 +6,21 @@ import { mayAct } from "../../mesh/console/account";
 import { Button } from "../../ui/button";
 import { FileButton } from "../../ui/file-button";
 import { TextInput } from "../../ui/text-input";
-import { canRedo, canUndo, download, draft, FILE_ENDING, isUnsaved, redo, rename, startProgram, undo } from "./draft";
-import { readProgramFile } from "./program-files";
-import { description } from "./program-robot";
-import { example } from "./program-text";
+import {
+  canRedo,
+  canUndo,
+  download,
+  draft,
+  FILE_ENDING,
+  isUnsaved,
+  redo,
+  rename,
+  startProgram,
+  undo,
+} from "./draft/draft";
+import { readProgramFile } from "./draft/program-files";
+import { example } from "./draft/program-text";
+import { description } from "./motion/program-robot";
 import {
   isDeleted,
   lastAction,
@@ -21,7 +32,7 @@ import {
   stored,
   timeOf,
   unusedProgramName,
-} from "./stored-programs";
+} from "./stored/stored-programs";
 import "./toolbar.css";
 
 export function Toolbar({ tell }: { tell: (words: Words) => void }) {

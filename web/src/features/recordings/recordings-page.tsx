@@ -2,8 +2,8 @@
 
 import "../../ui/replay.css";
 import type { RecordingName } from "../../ui/route";
-import { Player } from "./player";
-import { RecordingList } from "./recording-list";
+import { RecordingList } from "./list/recording-list";
+import { Player } from "./player/player";
 
 export function RecordingsPage({ shown }: { shown: readonly RecordingName[] }) {
   const [first, second] = shown;

@@ -38,15 +38,15 @@ import { State } from "../../ui/state";
 import { Tag } from "../../ui/tag";
 import { Warning } from "../../ui/warning";
 import { CameraPanel } from "./camera-panel";
-import { EventsPanel } from "./events-panel";
-import { JointsPanel } from "./joints-panel";
+import { EventsPanel } from "./events/events-panel";
 import { LayoutButton, LayoutPanel, layoutClasses, useLayout } from "./layout-panel";
 import { ClockHint, TopicChoice } from "./low-bandwidth";
+import { JointsPanel } from "./motion/joints-panel";
+import { RobotTool } from "./motion/robot-tool";
 import { NoteButton, NotePanel } from "./note-panel";
-import { PlotsPanel } from "./plots-panel";
+import { PlotsPanel } from "./plots/plots-panel";
 import { isShown, ProgramLine } from "./program-line";
 import { RecordButton, RecordPanel } from "./record-panel";
-import { RobotTool } from "./robot-tool";
 
 /** The page of a live robot; a replay has its own page, without commands. */
 export function RobotPage({ site, robot }: RobotName) {
