@@ -78,9 +78,11 @@ function NumberRow(props: {
   plus?: ComponentChildren;
 }) {
   return (
-    <div>
-      <dt title={props.label}>{props.label}</dt>
-      <dd>
+    <div class="flex spread baseline narrow gap-8">
+      <dt class="small clip" title={props.label}>
+        {props.label}
+      </dt>
+      <dd class="rigid nowrap">
         {props.minus}
         <span class="number">
           {props.text}

@@ -51,7 +51,7 @@ export function ValueChoice(props: {
           .sort(([a], [b]) => rank(a) - rank(b))
           .map(([topic, values]) => (
             <fieldset key={topic}>
-              <legend>{GROUPS[topic] ? r(GROUPS[topic]) : topic}</legend>
+              <legend class="dim small">{GROUPS[topic] ? r(GROUPS[topic]) : topic}</legend>
               {values.map((value) => {
                 const on = chosen.includes(value);
                 return (

@@ -152,7 +152,7 @@ function Row(props: { name: string; kind: string; detail: string; mark: Mark }) 
     <li class={`cell-row row gap-8 ${mark}`}>
       <button
         type="button"
-        class="cell-pick flex wrap baseline grow narrow small left tall-44 pad-8"
+        class="cell-pick pick flex wrap baseline grow narrow small tall-44 pad-8"
         aria-pressed={chosen.value === value}
         onClick={() => (chosen.value = value)}
       >

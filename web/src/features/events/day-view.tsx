@@ -169,7 +169,9 @@ function Hours({
 function Sentence({ line }: { line: DayLine }) {
   return (
     <li>
-      <time title={timeText(line.ms)}>{timeOfDay(line.ms)}</time>
+      <time class="dim" title={timeText(line.ms)}>
+        {timeOfDay(line.ms)}
+      </time>
       <span class="dim small">{d(`kind_${line.kind}`)}</span>
       <span class="day-text break">
         {line.bad && <span class="shape warning" aria-hidden="true" />}

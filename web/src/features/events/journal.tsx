@@ -246,9 +246,11 @@ function Line(props: { entry: Entry; open: boolean; withdrawn: boolean; choose: 
   const { entry, open, choose } = props;
   const stamp = "event" in entry ? entry.event.timestamp : entry.audit.timestamp;
   return (
-    <button class="journal-line grid wide left gap-0-12 pad-0-16" aria-expanded={open} onClick={() => choose(entry)}>
-      <time title={stampFull(stamp)}>{dayTime(entry.ms)}</time>
-      <span class="journal-of">{entry.robot === "-" ? entry.site : `${entry.site}/${entry.robot}`}</span>
+    <button class="journal-line pick grid gap-0-12 pad-0-16" aria-expanded={open} onClick={() => choose(entry)}>
+      <time class="dim clip" title={stampFull(stamp)}>
+        {dayTime(entry.ms)}
+      </time>
+      <span class="dim clip">{entry.robot === "-" ? entry.site : `${entry.site}/${entry.robot}`}</span>
       <span class="journal-text clip">
         <Withdrawable withdrawn={props.withdrawn}>
           {"event" in entry ? <EventWords entry={entry} /> : <AuditWords entry={entry} />}
@@ -303,9 +305,9 @@ function Details({ entry, withdrawn, close }: { entry: Entry; withdrawn: boolean
       )}
       <dl>
         {facts.map(([name, value]) => (
-          <div key={name}>
-            <dt>{name}</dt>
-            <dd>
+          <div key={name} class="flex gap-8">
+            <dt class="dim">{name}</dt>
+            <dd class="break">
               {name === "program_sha256" ? <a href={programLink(entry.site, entry.robot, value)}>{value}</a> : value}
             </dd>
           </div>

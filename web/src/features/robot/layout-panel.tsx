@@ -72,7 +72,7 @@ export function LayoutPanel(props: LayoutState & { site: string }) {
       {shown.value && (
         <div class="layout-row row wrap gap-8-16 pad-8-16">
           {PANELS.map((each) => (
-            <label key={each}>
+            <label key={each} class="row tall-32 gap-8">
               <input
                 type="checkbox"
                 checked={!layout.hidden.includes(each)}

@@ -121,7 +121,7 @@ function Start(props: {
         value={name}
         set={setName}
       />
-      <label>
+      <label class="row gap-8">
         <span class="dim small">{r("record_views")}</span>
         <Select
           value={views}

@@ -21,9 +21,9 @@ export function AttachedClients() {
       {lines.length === 0 ? (
         <p class="footnote">{s("nobody")}</p>
       ) : (
-        <ul class="presence-list pad-0-16-12">
+        <ul class="pad-0-16-12">
           {lines.map(({ token, site, robot, service, id }) => (
-            <li key={token}>
+            <li key={token} class="row wrap tall-32 gap-0-16">
               <span>{site}</span>
               {service === OPERATOR ? (
                 <a href={robotLink(site, robot)}>{`${holder(site, robot)} ${s("in_control_of", { robot })}`.trim()}</a>

@@ -23,11 +23,11 @@ export function Certificates() {
   return (
     <Panel name="certificates" title={s("certificates")}>
       <p class="footnote dim">{s("certificates_words")}</p>
-      <ul class="presence-list pad-0-16-12">
+      <ul class="pad-0-16-12">
         {certificates
           .sort((a, b) => a.left - b.left)
           .map(({ key, site, seen, left }) => (
-            <li key={key}>
+            <li key={key} class="row wrap tall-32 gap-0-16">
               <span>{site}</span>
               <strong>{seen.service}</strong>
               <span class="dim">{seen.host}</span>

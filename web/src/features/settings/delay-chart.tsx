@@ -16,7 +16,7 @@ export function DelayChart({ hops }: { hops: readonly Hop[] }) {
       {ways.map(([key, way]) => (
         <div key={key} class="way">
           <span class="break">{key.replace(/^robomesh\//, "")}</span>
-          <ol>
+          <ol class="small">
             {way.map((hop, i) => (
               <li key={i}>
                 <span>{s("hop", { sender: hop.sender, receiver: hop.receiver })}</span>

@@ -9,8 +9,8 @@ export function Facts({ of: facts }: { of: readonly Fact[] }) {
     <dl class="setting-facts pad-0-16-12">
       {facts.map(([name, value]) => (
         <div key={name}>
-          <dt>{name}</dt>
-          <dd>{value}</dd>
+          <dt class="dim">{name}</dt>
+          <dd class="break">{value}</dd>
         </div>
       ))}
     </dl>

@@ -44,7 +44,7 @@ export function ProcessRow(props: { of: string; seen: Seen; latest: Latest<MeshS
             </summary>
             <dl>
               {values.map(([name, value]) => (
-                <div key={name}>
+                <div key={name} class="flex gap-8">
                   <dt>{name}</dt>
                   <dd>{Number.isInteger(value) ? count(value) : fixed(value, 2)}</dd>
                 </div>

@@ -43,9 +43,9 @@ export function Sessions() {
   return (
     <Panel name="sessions" title={s("sessions")}>
       <p class="footnote dim">{s("sessions_words")}</p>
-      <ul class="presence-list pad-0-16-12">
+      <ul class="pad-0-16-12">
         {sessions.map((session) => (
-          <li key={session.id}>
+          <li key={session.id} class="row wrap tall-32 gap-0-16">
             <strong>{session.account}</strong>
             <span>{session.address}</span>
             <span class="dim" title={session.agent}>

@@ -70,7 +70,7 @@ export function RecoverForm(props: { robotKey: string; state: ControllerState | 
       done={send}
     >
       <fieldset class="recoveries">
-        <legend class="dim">{t("recover_which")}</legend>
+        <legend class="dim small">{t("recover_which")}</legend>
         {allowed(props.state).map((each) => (
           <label key={each}>
             <input type="radio" name="recovery" checked={chosen === each} onChange={() => setChosen(each)} />

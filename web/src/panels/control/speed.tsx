@@ -41,7 +41,7 @@ export function Speed(props: {
           : "\u00a0";
   return (
     <div class={`speed ${percent === undefined ? "unset" : unsent !== null ? "unsent" : low ? "low" : ""}`}>
-      <label>
+      <label class="row gap-12">
         <span class="dim">{t("speed")}</span>
         <input
           type="range"

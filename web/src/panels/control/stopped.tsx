@@ -33,7 +33,7 @@ export function Stopped(props: {
             {stop ? stopText(state, props.disobeyed) : t(state.activity === Activity.FAULT ? "own_fault" : "own_stop")}
           </span>
         </strong>
-        <p>
+        <p class="small">
           {stop && !stop.sent && `${t("stopped_unsent")} `}
           {isSaid(stop?.reason) && `${t("stop_reason", { reason: reasonText(stop.why, stop.reason) })} `}
           {!stop && state.fault && `${state.fault}. `}

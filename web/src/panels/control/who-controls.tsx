@@ -77,7 +77,7 @@ export function WhoControls(props: {
     <>
       <div class="take-row flex gap-8 pad-0-16-8">
         <label class="operator grow narrow">
-          <span class="dim">{t("operator")}</span>
+          <span class="unseen">{t("operator")}</span>
           <TextInput
             name="operator"
             autocomplete="username"

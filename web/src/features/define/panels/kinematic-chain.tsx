@@ -197,7 +197,7 @@ export function KinematicChain() {
           path="tool"
         />
       </ol>
-      <p class="chain-said" role="status">
+      <p class="unseen" role="status">
         {announced.value}
       </p>
       <div class="chain-tools flex ruled pad-4-8" role="group" aria-label={d("chain_tools")}>
@@ -244,7 +244,7 @@ function RowButton(props: {
   const wrong = problemsAt(props.path)[0];
   return (
     <button
-      class="chain-row row wide left tall-44 gap-12"
+      class="chain-row pick row tall-44 gap-12"
       data-part={String(props.part)}
       aria-current={chosenPart.value === props.part}
       onClick={() => choosePart(props.part)}

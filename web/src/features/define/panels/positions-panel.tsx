@@ -99,9 +99,9 @@ function ToolAt() {
   const tool = checked.value?.tool;
   const pose = tool && poseOf(new Matrix4().set(...(tool.flat() as Parameters<Matrix4["set"]>)), SI_TO_SHOWN);
   const number = (label: string, value: number | undefined, digits: number, unit: string) => (
-    <div key={label}>
-      <dt>{label}</dt>
-      <dd>
+    <div key={label} class="right">
+      <dt class="dim small">{label}</dt>
+      <dd class="nowrap">
         {value === undefined
           ? "–"
           : value

@@ -25,7 +25,7 @@ export function ProblemsPanel() {
         {found.map(({ path, text }) => (
           <button
             key={`${path.join("/")} ${text}`}
-            class="problem flex baseline wide break small left"
+            class="problem pick flex baseline break small"
             onClick={() => openField(path)}
           >
             <span class="shape warning" aria-hidden="true" />

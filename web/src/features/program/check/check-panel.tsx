@@ -125,7 +125,7 @@ function Row({ group: { worst, first, last, fromS, untilS } }: { group: Violatio
     if (line > 0) goToLine(line);
   };
   return (
-    <button class="violation grid wide small left tall-44 gap-0-8 pad-4-8" aria-current={current} onClick={show}>
+    <button class="violation pick grid small tall-44 gap-0-8 pad-4-8" aria-current={current} onClick={show}>
       <span class={`violation-kind row bold ${level}`}>
         <span class={`shape ${level}`} aria-hidden="true" />
         {known ? p(known) : kind}

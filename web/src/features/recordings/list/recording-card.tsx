@@ -56,7 +56,9 @@ export function RecordingCard(props: {
       <div class="recording-body narrow pad-8-0">
         <div class="recording-title row wrap">
           {!open && <Choose row={props.row} name={name} chosen={props.chosen} />}
-          <strong title={file}>{name}</strong>
+          <strong class="large bold break" title={file}>
+            {name}
+          </strong>
           {open && (
             <span class="tag recording-now">
               <span class="record-dot" aria-hidden="true" />

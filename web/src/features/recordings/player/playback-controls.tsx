@@ -71,7 +71,7 @@ export function PlaybackControls(props: {
           </span>
         </div>
         <div class="transport-end row to-end gap-8">
-          <label>
+          <label class="row gap-8">
             <span class="dim small">{r("speed")}</span>
             <Select
               label={r("speed")}

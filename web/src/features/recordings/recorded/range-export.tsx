@@ -146,7 +146,7 @@ function Seconds(props: {
   const rounded = (value: number) => Math.round(Math.min(Math.max(value, 0), props.most) * 1000) / 1000;
   return (
     <span class="range-seconds flex gap-4">
-      <label>
+      <label class="grow narrow">
         <span class="dim small">{props.label}</span>
         <TextInput
           inputMode="decimal"

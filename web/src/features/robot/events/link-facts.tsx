@@ -92,14 +92,14 @@ export function LinkFacts({ controller }: { controller: Latest<ControllerState> 
       aria-label={t("link")}
     >
       {capabilities && (
-        <div class="whole">
-          <dt>{t("can")}</dt>
+        <div class="whole-row flex gap-8">
+          <dt class="dim nowrap">{t("can")}</dt>
           <dd>{capabilities}</dd>
         </div>
       )}
       {facts.map(([name, value, unit]) => (
-        <div key={name}>
-          <dt>{t(name)}</dt>
+        <div key={name} class="flex spread gap-8">
+          <dt class="dim nowrap">{t(name)}</dt>
           <dd>
             {value}
             {unit && <Unit of={unit} />}

@@ -72,9 +72,12 @@ function Row(props: { signal: Signal; age: number | null; description: Descripti
   const stale = isStale("signals", own);
   const on = signal.value.case === "on" && signal.value.value;
   return (
-    <div title={own === null || !stale ? signal.name : `${signal.name}: ${ageText(own)}`}>
-      <dt>{signalText(signal.name, description)}</dt>
-      <dd class={`${stale ? "stale" : ""} ${on ? "on" : ""}`}>
+    <div
+      class="flex spread narrow gap-8"
+      title={own === null || !stale ? signal.name : `${signal.name}: ${ageText(own)}`}
+    >
+      <dt class="dim break">{signalText(signal.name, description)}</dt>
+      <dd class={`break right ${stale ? "stale" : ""} ${on ? "bold" : ""}`}>
         {text}
         {unit && <Unit of={unit} />}
       </dd>
