@@ -1,5 +1,6 @@
 // Style sheets of Define, in the order of the cascade: a later sheet overrides an earlier one.
 
+import "../../ui/robot-cards.css";
 import "./define-page.css";
 import "./panels/toolbar.css";
 import "./opening/missing-files.css";

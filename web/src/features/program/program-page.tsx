@@ -42,6 +42,7 @@ import { lastAction, say, showHash, shown, stored } from "./stored/stored-progra
 import { addTeachGizmo } from "./teach/teach-gizmo";
 import { TeachPanel } from "./teach/teach-panel";
 import { Toolbar } from "./toolbar";
+import "../../ui/robot-cards.css";
 import "./program-page.css";
 
 const MOVED = 0.005; // rad or m: a larger distance from the check's start makes the check outdated
@@ -59,10 +60,10 @@ function Choose() {
       <h1>{p("choose")}</h1>
       <p class="dim">{p("choose_words")}</p>
       {robots.length === 0 && <p class="dim">{t("no_robots")}</p>}
-      <ul>
+      <ul class="robot-cards grid gap-8">
         {robots.map(([site, robot]) => (
           <li key={`${site}/${robot}`}>
-            <a href={programLink(site, robot)}>
+            <a class="robot-card grid card pad-8-16" href={programLink(site, robot)}>
               <strong>{robot}</strong>
               <span class="dim small">{site}</span>
             </a>

@@ -121,7 +121,7 @@ export function MotionCurves() {
       <div class="legend flex wrap small dim gap-0-16 pad-0-16">
         {joints.map((joint, i) => (
           <span key={joint.name}>
-            <span class={`curve curve-${(i % CURVES.length) + 1}`} aria-hidden="true" />
+            <span class="curve" style={{ background: `var(${CURVES[i % CURVES.length]})` }} aria-hidden="true" />
             {jointTitle(joint)}
           </span>
         ))}

@@ -134,7 +134,11 @@ function Named({ curve, label, moment }: { curve: Curve; label: string; moment: 
   const value = valueAt(series, moment.value + shift, holds);
   return (
     <span>
-      <span class={`curve curve-${(colour % CURVES) + 1} ${second ? "second" : ""}`} aria-hidden="true" />
+      <span
+        class={`curve ${second ? "dashed" : ""}`}
+        style={{ background: `var(--curve-${(colour % CURVES) + 1})` }}
+        aria-hidden="true"
+      />
       <span title={series.name}>{label}</span>
       {/* No output element: a screen reader would say each value as it plays. */}
       <span class="figure">

@@ -247,7 +247,9 @@ function Legend(props: {
 
 export function CurveMark({ index }: { index: number }) {
   const dash = DASHES[Math.floor(index / CURVES) % DASHES.length];
-  return <span class={`curve curve-${(index % CURVES) + 1} ${dash}`} aria-hidden="true" />;
+  return (
+    <span class={`curve ${dash}`} style={{ background: `var(--curve-${(index % CURVES) + 1})` }} aria-hidden="true" />
+  );
 }
 
 function withUnit(text: string, unit: string): string {
