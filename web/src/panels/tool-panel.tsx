@@ -79,7 +79,7 @@ function NumberRow(props: {
 }) {
   return (
     <div class="flex spread baseline narrow gap-8">
-      <dt class="small clip" title={props.label}>
+      <dt class="dim small clip" title={props.label}>
         {props.label}
       </dt>
       <dd class="rigid nowrap">

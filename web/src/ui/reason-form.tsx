@@ -47,7 +47,7 @@ export function ReasonForm(props: {
         <span class="dim">{t(props.required ? "reason_required" : "reason_optional")}</span>
         <TextInput ref={input} maxLength={120} value={reason} set={setReason} />
       </label>
-      <div class="reason-row flex gap-8 pad-0-16-8">
+      <div class="reason-row flex to-end gap-8">
         <Button text={t("cancel")} type="button" onClick={props.close} />
         <Button primary text={props.does} type="submit" disabled={missing} />
       </div>

@@ -100,7 +100,7 @@ export function ContentPanel({ robotKey }: { robotKey: string }) {
           close={() => setReview(null)}
           done={(reason) => void confirm(reason)}
         >
-          <ul class="cell-changes pad-0-8">
+          <ul class="break">
             {review.changes.map((each) => (
               <li key={`${each.fixture}.${each.key}`}>{changeText(each)}</li>
             ))}

@@ -305,9 +305,9 @@ function Details({ entry, withdrawn, close }: { entry: Entry; withdrawn: boolean
       )}
       <dl>
         {facts.map(([name, value]) => (
-          <div key={name} class="flex gap-8">
+          <div key={name}>
             <dt class="dim">{name}</dt>
-            <dd class="break">
+            <dd>
               {name === "program_sha256" ? <a href={programLink(entry.site, entry.robot, value)}>{value}</a> : value}
             </dd>
           </div>

@@ -45,7 +45,7 @@ export function FleetPage() {
   const settled = useSettled();
   return (
     <div class="fleet">
-      <div class="fleet-head flex wrap baseline gap-16">
+      <div class="fleet-head row wrap gap-16">
         <h1>{t("all_robots")}</h1>
         <span class="dim">{count(robots.length)}</span>
         <Summary states={[...states.values()]} />

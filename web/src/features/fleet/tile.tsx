@@ -73,7 +73,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
           <State state={state} />
         </div>
         <div class="tile-line dim">
-          <span class="tile-title">
+          <span class="narrow clip">
             {description ? robotTitle(description) : "\u00a0"}
             {isRemote && <span title={f("far_hint")}> · {f("far")}</span>}
           </span>
@@ -87,7 +87,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
           )}
         </div>
         <div class="tile-line dim">
-          <span class="tile-holder" title={leaseKnown && holder ? stampFull(lease.message.since) : ""}>
+          <span class="narrow clip" title={leaseKnown && holder ? stampFull(lease.message.since) : ""}>
             {!leaseKnown
               ? t("holder_unknown")
               : holder
@@ -98,7 +98,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
         {/* One line for each case, so that a tile's height never changes. */}
         <div class="tile-line">
           {problem ? (
-            <p class={`tile-problem clip small ${state.level}`} title={problem}>
+            <p class={`tile-problem narrow clip small ${state.level}`} title={problem}>
               {problem}
             </p>
           ) : (

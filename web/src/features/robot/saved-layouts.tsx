@@ -66,7 +66,7 @@ export function SavedLayouts(props: { site: string; text: string }) {
       aria-label={p("saved_layouts", { site })}
       onSubmit={submit(() => able && void save())}
     >
-      <span class="layout-field">
+      <span class="row tall-32 gap-8">
         {p("saved_layouts", { site })}
         <Select
           label={p("saved_layouts", { site })}

@@ -43,15 +43,15 @@ export function RecordingEditor({ row, close }: { row: Row; close: () => void })
         onKeyDown={(event) => event.key === "Escape" && close()}
         onSubmit={submit(save)}
       >
-        <label class="grid gap-4">
+        <label>
           <span class="dim small">{r("name")}</span>
           <TextInput value={name} maxLength={LONGEST_NAME} set={setName} />
         </label>
-        <label class="grid gap-4">
+        <label>
           <span class="dim small">{r("tags_hint")}</span>
           <TextInput value={tags} set={setTags} />
         </label>
-        <label class="whole-row grid gap-4">
+        <label class="whole-row">
           <span class="dim small">{r("note")}</span>
           <textarea
             rows={3}

@@ -42,7 +42,7 @@ export function RecordingList() {
   useEffect(() => () => void (first.value = null), []);
   return (
     <div class="recordings">
-      <div class="fleet-head flex wrap baseline gap-16">
+      <div class="fleet-head row wrap gap-16">
         <h1>{r("recordings")}</h1>
         <span class="dim">{countText(shown.length, rows.length)}</span>
         <div class="recordings-filters flex narrow push gap-8">
