@@ -27,7 +27,7 @@ from robomesh.client.robot.samples import (
     joint_types,
     sample_fields,
 )
-from robomesh.client.robot.streams import AsyncStream, OnStale, Reading, check_options
+from robomesh.client.robot.streams import AsyncStream, OnStale, SampleReader, check_options
 from robomesh.contract.keys import check_chunk, check_name, robot_key
 from robomesh.contract.topics import OF_ARM, stale_after_s, topic
 from robomesh.errors import MessageError, NoAnswerError
@@ -167,15 +167,15 @@ class AsyncRobot:
                 yield SignalState(**fields) if of_signals else Sample(**fields)
 
         limit_s = stale_after_s(name, None)
-        reading = Reading(subscription, convert, limit_s=limit_s, on_stale=on_stale)
+        reader = SampleReader(subscription, convert, limit_s=limit_s, on_stale=on_stale)
 
         async def learn() -> None:
             """Learn the types of the joints, and the robot's own time for its joints."""
             with contextlib.suppress(NoAnswerError):
                 # Without it, only degrees are not known.
-                reading.set_limit(stale_after_s(name, await self.description()))
+                reader.set_limit(stale_after_s(name, await self.description()))
 
-        return AsyncStream(reading, learn if name in OF_ARM else None)
+        return AsyncStream(reader, learn if name in OF_ARM else None)
 
     def events(self, *, history: bool = True) -> AsyncStream[Event]:
         """Return the events of the robot's gateway and of other services about it.
@@ -410,8 +410,8 @@ async def first_of(stream: AsyncStream[Sample]) -> Sample | None:
         return None
 
 
-def events_of(session: Session, key_expr: str, *, history: bool) -> Reading[Event]:
-    """Return the reading of the events of a key expression."""
+def events_of(session: Session, key_expr: str, *, history: bool) -> SampleReader[Event]:
+    """Return the reader of the events of a key expression."""
 
     def convert(sample: RawSample, stale: bool, skipped: int) -> Iterator[Event]:
         message, key = sample.message(), sample.parsed
@@ -423,7 +423,7 @@ def events_of(session: Session, key_expr: str, *, history: bool) -> Reading[Even
                 yield event_of(key.site, key.robot, event)
 
     subscription = session.subscribe(key_expr, newest=_EVENTS, history=history)
-    return Reading(subscription, convert, limit_s=None, on_stale="raise")
+    return SampleReader(subscription, convert, limit_s=None, on_stale="raise")
 
 
 def _flat(pose: Iterable[Any]) -> list[float]:

@@ -62,8 +62,8 @@ def check_options(buffer: int, on_stale: OnStale) -> None:
         raise ValueError(f"on_stale={on_stale!r}: must be 'raise' or 'yield'")
 
 
-class Reading(Generic[T]):
-    """Selection of the values that a stream returns; it never waits.
+class SampleReader(Generic[T]):
+    """Reader of a subscription for a stream: it selects the values to return, and never waits.
 
     Args:
         convert: Returns the values of a sample, given `stale` and `skipped`.
@@ -160,25 +160,25 @@ class Reading(Generic[T]):
 class _Counted(Generic[T]):
     """The counters of a stream, which unsubscribes when it is no longer used."""
 
-    def __init__(self, reading: Reading[T]) -> None:
-        self._reading = reading
-        self._unsubscribe = weakref.finalize(self, reading.subscription.close_soon)
+    def __init__(self, reader: SampleReader[T]) -> None:
+        self._reader = reader
+        self._unsubscribe = weakref.finalize(self, reader.subscription.close_soon)
         # A mesh that is not closed is closed when the main thread ends.
         self._unsubscribe.atexit = False
 
     def __repr__(self) -> str:
-        subscription = self._reading.subscription
+        subscription = self._reader.subscription
         return f"<{'closed ' if subscription.closed else ''}stream of {subscription.key_expr}>"
 
     @property
     def skipped(self) -> int:
         """Number of messages that the stream did not return: they were skipped, lost, or stale."""
-        return self._reading.skipped
+        return self._reader.skipped
 
     @property
     def lost(self) -> int:
         """Number of messages that the network lost."""
-        return self._reading.subscription.total_lost
+        return self._reader.subscription.total_lost
 
 
 class AsyncStream(_Counted[T]):
@@ -187,8 +187,8 @@ class AsyncStream(_Counted[T]):
     A program that is slower than the topic gets the newest message, and skips the ones before it.
     """
 
-    def __init__(self, reading: Reading[T], prepare: Callable[[], Awaitable[None]] | None = None) -> None:
-        super().__init__(reading)
+    def __init__(self, reader: SampleReader[T], prepare: Callable[[], Awaitable[None]] | None = None) -> None:
+        super().__init__(reader)
         self._prepare = prepare
 
     def __aiter__(self) -> Self:
@@ -196,14 +196,14 @@ class AsyncStream(_Counted[T]):
 
     async def __anext__(self) -> T:
         await self.prepare()
-        subscription = self._reading.subscription
+        subscription = self._reader.subscription
         while True:
-            if (value := self._reading.next(awaited=True)) is not None:
+            if (value := self._reader.next(awaited=True)) is not None:
                 return value
             if subscription.closed:
                 raise StopAsyncIteration
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(self._reading.left_s()):
+                async with asyncio.timeout(self._reader.left_s()):
                     await subscription.arrived()
 
     async def __aenter__(self) -> Self:
@@ -220,7 +220,7 @@ class AsyncStream(_Counted[T]):
 
     def close(self) -> None:
         """Unsubscribe; the iterator ends."""
-        self._reading.subscription.close()
+        self._reader.subscription.close()
 
     def blocking(self, connection: object) -> "Stream[T]":
         """Return this stream for a thread, instead of this one.
@@ -229,7 +229,7 @@ class AsyncStream(_Counted[T]):
             connection: Ends when no object refers to it.
         """
         self._unsubscribe.detach()
-        return Stream(self._reading, connection)
+        return Stream(self._reader, connection)
 
 
 class Stream(_Counted[T]):
@@ -238,8 +238,8 @@ class Stream(_Counted[T]):
     A program that is slower than the topic gets the newest message, and skips the ones before it.
     """
 
-    def __init__(self, reading: Reading[T], connection: object) -> None:
-        super().__init__(reading)
+    def __init__(self, reader: SampleReader[T], connection: object) -> None:
+        super().__init__(reader)
         self._connection = connection
 
     def __iter__(self) -> Self:
@@ -259,17 +259,17 @@ class Stream(_Counted[T]):
             StaleError: If the topic has fallen silent.
             StopIteration: If the stream was closed.
         """
-        subscription = self._reading.subscription
+        subscription = self._reader.subscription
         deadline_s = math.inf if timeout_s is None else time.monotonic() + timeout_s
         while True:
-            if (value := self._reading.next(awaited=False)) is not None:
+            if (value := self._reader.next(awaited=False)) is not None:
                 return value
             if subscription.closed:
                 raise StopIteration
             left_s = deadline_s - time.monotonic()
             if left_s <= 0:
                 raise TimeoutError(f"{subscription.key_expr}: no message within {timeout_s:g} s")
-            silent_s = self._reading.left_s()
+            silent_s = self._reader.left_s()
             subscription.wait(min(left_s, _POLL_S, math.inf if silent_s is None else silent_s))
 
     def __enter__(self) -> Self:
@@ -280,4 +280,4 @@ class Stream(_Counted[T]):
 
     def close(self) -> None:
         """Unsubscribe; the iterator ends."""
-        self._reading.subscription.close_soon()
+        self._reader.subscription.close_soon()
