@@ -34,7 +34,7 @@ JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
 VIEWS = ("front", "top", "left", "free")
 ARM = "robomesh/hall/arm"
 # Requested views in full size and rate are an eighth of these.
-_MANY = 1024
+_MANY = 256
 _FIRST_WITHIN_S = 30.0
 
 

@@ -4,23 +4,28 @@ import contextlib
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from robomesh.client.recordings.recorder_file import Fetched, RecorderFile
+from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.errors import QuotaError
 from services.command_line.record.export.errors import ExportError
 from services.command_line.record.listing import attached_for, found
 from services.command_line.terminal import discovery
+from services.command_line.terminal.options import Connect, Json
 from services.command_line.terminal.output import print_json, print_line, progress
 
 
-def run(what: str, out: Path, router: str, as_json: bool) -> None:
-    """Fetch `[SITE/]NAME` or `[SITE/]FILE`, and resume an earlier fetch of the same version.
-
-    Raises:
-        ExportError: If no recording has the name, or it cannot be written.
-        RecordingError: If it changes during the fetch.
-    """
-    done = _run(what, out, router)
+def fetch(
+    what: Annotated[str, typer.Argument(metavar="[SITE/]NAME", help="A name or file from `list`.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="A file, or a folder.")] = Path(),
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
+) -> None:
+    """Fetch a recording from its site; a repeated fetch resumes."""
+    done = _run(what, out, connect)
     if as_json:
         print_json({"file": str(done.file), "bytes": done.total, "resumed_at": done.resumed_at})
     else:

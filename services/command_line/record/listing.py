@@ -1,11 +1,13 @@
 """`robomesh recordings list` and `info`: the recordings of all sites, and the content of one."""
 
 import json
-from collections.abc import AsyncIterator, Collection
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from robomesh import reason_codes as codes
 from robomesh.client.recordings.descriptions import (
@@ -15,6 +17,7 @@ from robomesh.client.recordings.descriptions import (
     list_recordings,
 )
 from robomesh.client.recordings.recorder_file import RecorderFile
+from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.contract.enum_names import enum_word
 from robomesh.contract.messages import to_json
 from robomesh.errors import RobomeshError, SessionError
@@ -25,20 +28,35 @@ from robomesh.wire.session import Session
 from services.command_line.record.export.errors import ExportError
 from services.command_line.terminal import discovery
 from services.command_line.terminal.local_time import local_time, time_text
+from services.command_line.terminal.options import Connect, Json
 from services.command_line.terminal.output import print_json, print_line
 
+NamedRecording = Annotated[
+    str, typer.Argument(metavar="[SITE/]NAME", help="A name or file from `list`; not that of several.")
+]
+RecordingSource = Annotated[
+    str,
+    typer.Argument(metavar="FILE.mcap|[SITE/]NAME", help="A file of this machine, or a name from `list`."),
+]
 _Change = schema.RecordingChange
 
 
-def list_all(router: str, *, deleted: bool, tags: Collection[str], as_json: bool) -> None:
-    """Print every recording of every site that has all the tags."""
-    wanted = {each.casefold() for each in tags}
+def list_(
+    deleted: Annotated[bool, typer.Option("--deleted", help="Deleted recordings too.")] = False,
+    tag: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Only with this tag.")] = None,
+    connect: Connect = DEFAULT_ROUTER,
+    as_json: Json = False,
+) -> None:
+    """List the recordings of every site, newest first."""
+    wanted = {each.casefold() for each in tag or ()}
 
     async def main() -> list[RecordingInfo]:
-        async with discovery.attached(router) as session:
+        async with discovery.attached(connect) as session:
             return await list_recordings(session, deleted=deleted, on_silent=_report_silent)
 
-    recordings = [each for each in discovery.run(main()) if wanted <= {tag.casefold() for tag in each.tags}]
+    recordings = [
+        each for each in discovery.run(main()) if wanted <= {tagged.casefold() for tagged in each.tags}
+    ]
     for each in recordings:
         each.message.site = each.site
         if as_json:
@@ -116,11 +134,11 @@ async def attached_for(what: str, router: str) -> AsyncIterator[Session]:
         raise ExportError(f"{what}: no such file on this machine, and no mesh to search: {error}") from None
 
 
-def info(what: str, router: str, as_json: bool) -> None:
-    """Print the content of a file of this machine, or of a recording of a site."""
+def info(what: RecordingSource, connect: Connect = DEFAULT_ROUTER, as_json: Json = False) -> None:
+    """Show a recording's topics, message counts, losses and attachments."""
 
     async def ask() -> schema.Recording:
-        async with attached_for(what, router) as session:
+        async with attached_for(what, connect) as session:
             listed = await found(session, what)
             asker = session.own_name
             return await RecorderFile(session, listed.recorder_site, listed.file, asker=asker).describe()

@@ -7,15 +7,20 @@ import signal
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Annotated
 
+import typer
+
+from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.contract.keys import WHOLE_SITE, robot_key
 from robomesh.errors import RobomeshError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import OPERATOR, session_of
 from robomesh.wire.session import Session
 from services.command_line.record.export.errors import ExportError
-from services.command_line.record.listing import attached_for, found
+from services.command_line.record.listing import RecordingSource, attached_for, found
 from services.command_line.terminal import discovery
+from services.command_line.terminal.options import Connect
 from services.command_line.terminal.output import print_line, progress
 
 _OPEN_WITHIN_S = 20.0
@@ -23,9 +28,16 @@ _OPEN_WITHIN_S = 20.0
 _SILENT_S = 5.0
 
 
-def run(what: str, request: schema.PlayRequest, router: str) -> None:
-    """Play a file of this machine, or a recording of a site by its name, with a progress bar."""
-    discovery.run(_play(what, Path(what) if Path(what).is_file() else None, request, router))
+def play(
+    what: RecordingSource,
+    speed: Annotated[float, typer.Option(help="0.1 to 100")] = 1.0,
+    at: Annotated[float, typer.Option(metavar="SECONDS", help="Start position.")] = 0.0,
+    loop: Annotated[bool, typer.Option("--loop", help="Repeat.")] = False,
+    connect: Connect = DEFAULT_ROUTER,
+) -> None:
+    """Play a recording as a separate robot, replay-..., until Ctrl-C."""
+    request = schema.PlayRequest(speed=speed, position_s=at, loop=loop)
+    discovery.run(_play(what, Path(what) if Path(what).is_file() else None, request, connect))
 
 
 async def _play(what: str, path: Path | None, request: schema.PlayRequest, router: str) -> None:

@@ -1,21 +1,20 @@
 """`robomesh recordings recover`: completion of a file whose writer was killed."""
 
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.writing import recover as files
 from robomesh.recordings.writing.capture import is_being_written
 from services.command_line.record.export.errors import ExportError
+from services.command_line.terminal.options import Json
 from services.command_line.terminal.output import print_json, print_line, progress
 
 
-def run(file: Path, as_json: bool) -> None:
-    """Complete a file; the original is kept until the new one is verified.
-
-    Raises:
-        CaptureError: If the file holds nothing to recover.
-        ExportError: If the file is still being written, or the disk refuses.
-    """
+def recover(file: Annotated[Path, typer.Argument(metavar="FILE.mcap")], as_json: Json = False) -> None:
+    """Complete a recording whose writer was killed; a recorder does this when it starts."""
     state = files.state_of(file)
     if is_being_written(file):
         raise ExportError(f"{file}: is still being recorded: recover it after that ends")
