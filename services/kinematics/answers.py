@@ -75,7 +75,7 @@ def answer_robot_requests(
         glbs = shapes()
         if request.chunk not in glbs:
             available = ", ".join(glbs) or "none"
-            raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, shapes=available))
+            raise RefusedError(codes.MESH_UNKNOWN(name=request.chunk, robot=robot, meshes=available))
         return glbs[request.chunk]
 
     async def answer_forward(request: Request) -> schema.ForwardAnswer:

@@ -16,7 +16,7 @@ from services.pki import Folder, authority
 from services.ros2.service import serve as serve_ros2
 from services.ros2.settings import Settings as Ros2Settings
 from services.router.router import read_access
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 from tests.protocol_gateway.gateway_site import until
 from tests.services.foxglove_client import attached
 from tests.services.test_foxglove import ARM, bridge, joints
@@ -47,82 +47,73 @@ async def hall(secured):
         yield session
 
 
-def test_a_monitors_certificate_reads_everything_and_commands_nothing(secured):
-    async def main():
-        folder, endpoint = secured
-        mo = mesh_of(endpoint, folder.person("mo"))
-        async with hall(secured) as robot, bridge(mo, operator="mo.hall") as address:
-            states = robot.declare_publisher("hall", "arm", "joints")
-            async with attached(address) as client:
-                await client.subscribe(f"{ARM}/joints")
-                await client.until(lambda: states.watched)
-                states.put(joints(0.5))
-                assert (await client.first(f"{ARM}/joints", JointStates)).joints[0].position == 0.5
-                answer = await client.call(f"{ARM}/home")
-                assert not answer["accepted"]
-                assert answer["code"] == "request.no_right"
-            who, _ = await robot.present_sessions()
-            assert ("hall", MONITOR) in {(each.site, each.service) for each in who}
-
-    run(main())
+async def test_a_monitors_certificate_reads_everything_and_commands_nothing(secured):
+    folder, endpoint = secured
+    mo = mesh_of(endpoint, folder.person("mo"))
+    async with hall(secured) as robot, bridge(mo, operator="mo.hall") as address:
+        states = robot.declare_publisher("hall", "arm", "joints")
+        async with attached(address) as client:
+            await client.subscribe(f"{ARM}/joints")
+            await client.until(lambda: states.watched)
+            states.put(joints(0.5))
+            assert (await client.first(f"{ARM}/joints", JointStates)).joints[0].position == 0.5
+            answer = await client.call(f"{ARM}/home")
+            assert not answer["accepted"]
+            assert answer["code"] == "request.no_right"
+        who, _ = await robot.present_sessions()
+        assert ("hall", MONITOR) in {(each.site, each.service) for each in who}
 
 
-def test_an_operators_certificate_requests_only_in_its_own_name(secured):
-    async def main():
-        folder, endpoint = secured
-        li = mesh_of(endpoint, folder.person("li"))
-        asked = []
+async def test_an_operators_certificate_requests_only_in_its_own_name(secured):
+    folder, endpoint = secured
+    li = mesh_of(endpoint, folder.person("li"))
+    asked = []
 
-        async def lease(request):
-            asked.append(request.chunk)
-            return schema.LeaseAnswer(lease="secret")
+    async def lease(request):
+        asked.append(request.chunk)
+        return schema.LeaseAnswer(lease="secret")
 
-        async def command(request):
-            return schema.CommandAnswer(accepted=True, text="on its way")
+    async def command(request):
+        return schema.CommandAnswer(accepted=True, text="on its way")
 
-        async with hall(secured) as robot:
-            robot.answer("hall", "arm", "lease/request/*", lease)
-            robot.answer("hall", "arm", "command/*", command)
-            for operator, accepted in (("wang.hall", False), ("li.hall", True)):
-                async with bridge(li, operator=operator) as address, attached(address) as client:
-                    answer = await client.call(f"{ARM}/speed", speed_percent=10)
-                    assert answer["accepted"] is accepted, answer
-                    assert accepted or "another name" in answer["text"]
-            assert set(asked) == {"li.hall"}
-
-    run(main())
+    async with hall(secured) as robot:
+        robot.answer("hall", "arm", "lease/request/*", lease)
+        robot.answer("hall", "arm", "command/*", command)
+        for operator, accepted in (("wang.hall", False), ("li.hall", True)):
+            async with bridge(li, operator=operator) as address, attached(address) as client:
+                answer = await client.call(f"{ARM}/speed", speed_percent=10)
+                assert answer["accepted"] is accepted, answer
+                assert accepted or "another name" in answer["text"]
+        assert set(asked) == {"li.hall"}
 
 
-def test_only_the_ros2_certificate_publishes_to_ros_nodes(secured, tmp_path):
-    async def main():
-        folder, endpoint = secured
-        got, forged = [], "0/joint_states/forged"
-        node = mesh_of(endpoint, folder.service("ros2"))
-        with (
-            zenoh.open(client_config((endpoint,), bundle(folder.service("ros2")))) as ros,
-            zenoh.open(client_config((endpoint,), bundle(folder.person("mo")))) as monitor,
-            ros.declare_subscriber("0/joint_states/**", lambda sample: got.append(str(sample.key_expr))),
-        ):
-            async with hall(secured) as robot, open_session(node) as session:
-                settings = Ros2Settings(shapes=tmp_path)
-                serving = asyncio.create_task(serve_ros2(session, settings))
-                try:
-                    states = robot.declare_publisher("hall", "arm", "joints")
-                    await until(lambda: states.watched)
-                    while not got:
-                        monitor.put(forged, b"forged")
-                        states.put(joints(0.5))
-                        await asyncio.sleep(0.05)
+async def test_only_the_ros2_certificate_publishes_to_ros_nodes(secured, tmp_path):
+    folder, endpoint = secured
+    got, forged = [], "0/joint_states/forged"
+    node = mesh_of(endpoint, folder.service("ros2"))
+    with (
+        zenoh.open(client_config((endpoint,), bundle(folder.service("ros2")))) as ros,
+        zenoh.open(client_config((endpoint,), bundle(folder.person("mo")))) as monitor,
+        ros.declare_subscriber("0/joint_states/**", lambda sample: got.append(str(sample.key_expr))),
+    ):
+        async with hall(secured) as robot, open_session(node) as session:
+            settings = Ros2Settings(shapes=tmp_path)
+            serving = asyncio.create_task(serve_ros2(session, settings))
+            try:
+                states = robot.declare_publisher("hall", "arm", "joints")
+                await until(lambda: states.watched)
+                while not got:
+                    monitor.put(forged, b"forged")
                     states.put(joints(0.5))
-                    before = len(got)
-                    while len(got) <= before + 1:
-                        monitor.put(forged, b"forged")
-                        states.put(joints(0.5))
-                        await asyncio.sleep(0.05)
-                    assert forged not in got
-                    assert not serving.done()
-                finally:
-                    serving.cancel()
-                    await asyncio.gather(serving, return_exceptions=True)
-
-    run(main())
+                    await asyncio.sleep(0.05)
+                states.put(joints(0.5))
+                before = len(got)
+                while len(got) <= before + 1:
+                    monitor.put(forged, b"forged")
+                    states.put(joints(0.5))
+                    await asyncio.sleep(0.05)
+                assert forged not in got
+                assert not serving.done()
+            finally:
+                serving.cancel()
+                await asyncio.gather(serving, return_exceptions=True)

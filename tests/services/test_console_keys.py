@@ -1,7 +1,6 @@
 """A console with a certificate and no accounts: its pages act under the console's name only."""
 
 from robomesh.schemas import robomesh_pb2 as schema
-from tests.conftest import run
 from tests.services.test_attach_keys import hall, mesh_of, secured
 from tests.services.test_console import browse, console, page
 
@@ -10,32 +9,29 @@ ACQUIRE = schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE).SerializeToStr
 ARM = "robomesh/hall/arm"
 
 
-def test_a_page_without_accounts_acts_as_the_console_only(secured, page):
-    async def main():
-        folder, endpoint = secured
-        asked = []
+async def test_a_page_without_accounts_acts_as_the_console_only(secured, page):
+    folder, endpoint = secured
+    asked = []
 
-        async def lease(request):
-            asked.append(request.chunk)
-            return schema.LeaseAnswer(lease="secret")
+    async def lease(request):
+        asked.append(request.chunk)
+        return schema.LeaseAnswer(lease="secret")
 
-        async def stop(request):
-            asked.append(request.message.by)
-            return schema.StopAnswer(sent=True)
+    async def stop(request):
+        asked.append(request.message.by)
+        return schema.StopAnswer(sent=True)
 
-        mesh = mesh_of(endpoint, folder.service("console"))
-        async with hall(secured) as robot, console(mesh, page, site="hall") as (address, _):
-            robot.answer("hall", "arm", "lease/request/*", lease)
-            robot.answer("hall", "arm", "stop", stop)
-            async with browse(address) as browser:
-                await browser.until(lambda: browser.other)
-                hello = browser.other[0].hello
-                assert (hello.account, hello.operator, hello.may_command) == ("", "console.hall", True)
-                answer = await browser.ask(1, f"{ARM}/lease/request/li.hall", ACQUIRE)
-                assert answer.error == "this page may send requests only as console.hall, not as li.hall"
-                assert (await browser.ask(2, f"{ARM}/lease/request/console.hall", ACQUIRE)).ok
-                payload = schema.StopRequest(by="li.hall").SerializeToString()
-                assert (await browser.ask(3, f"{ARM}/stop", payload)).ok
-                assert asked == ["console.hall", "console.hall"]
-
-    run(main())
+    mesh = mesh_of(endpoint, folder.service("console"))
+    async with hall(secured) as robot, console(mesh, page, site="hall") as (address, _):
+        robot.answer("hall", "arm", "lease/request/*", lease)
+        robot.answer("hall", "arm", "stop", stop)
+        async with browse(address) as browser:
+            await browser.until(lambda: browser.other)
+            hello = browser.other[0].hello
+            assert (hello.account, hello.operator, hello.may_command) == ("", "console.hall", True)
+            answer = await browser.ask(1, f"{ARM}/lease/request/li.hall", ACQUIRE)
+            assert answer.error == "this page may send requests only as console.hall, not as li.hall"
+            assert (await browser.ask(2, f"{ARM}/lease/request/console.hall", ACQUIRE)).ok
+            payload = schema.StopRequest(by="li.hall").SerializeToString()
+            assert (await browser.ask(3, f"{ARM}/stop", payload)).ok
+            assert asked == ["console.hall", "console.hall"]

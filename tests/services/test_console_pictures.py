@@ -143,61 +143,52 @@ async def unwatched(publishers, timeout_s=10.0):
             await asyncio.sleep(0.02)
 
 
-def test_mjpeg_is_one_picture_after_another_until_its_reader_goes(mesh, page):  # noqa: F811
-    async def main():
-        async with rendered(mesh, page) as (address, renderer):
-            head, body, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=12_000)
-            assert "200 ok" in head
-            assert "multipart/x-mixed-replace; boundary=picture" in head
-            assert "content-encoding" not in head
-            with av.open(io.BytesIO(body), format="mpjpeg") as container:
-                shades = []
-                with suppress(av.FFmpegError):  # the last one may be cut
-                    shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
-            assert len({round(shade) for shade in shades}) > 2
-            # The shared view: nothing is rendered for this reader only.
-            assert [publisher.watched for publisher in renderer.images] == [True, False]
-            writer.close()
-            await unwatched(renderer.images)
-
-    run(main())
+async def test_mjpeg_is_one_picture_after_another_until_its_reader_goes(mesh, page):  # noqa: F811
+    async with rendered(mesh, page) as (address, renderer):
+        head, body, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=12_000)
+        assert "200 ok" in head
+        assert "multipart/x-mixed-replace; boundary=picture" in head
+        assert "content-encoding" not in head
+        with av.open(io.BytesIO(body), format="mpjpeg") as container:
+            shades = []
+            with suppress(av.FFmpegError):  # the last one may be cut
+                shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
+        assert len({round(shade) for shade in shades}) > 2
+        # The shared view: nothing is rendered for this reader only.
+        assert [publisher.watched for publisher in renderer.images] == [True, False]
+        writer.close()
+        await unwatched(renderer.images)
 
 
-def test_an_mjpeg_whose_pictures_end_says_that_it_is_stale_and_then_ends(mesh, page, monkeypatch):  # noqa: F811
+async def test_an_mjpeg_whose_pictures_end_says_that_it_is_stale_and_then_ends(mesh, page, monkeypatch):  # noqa: F811
     monkeypatch.setattr(pictures, "_STALE_AFTER_S", 0.25)
     monkeypatch.setattr(pictures, "_SILENT_S", 0.75)
 
-    async def main():
-        async with rendered(mesh, page) as (address, renderer):
-            _, body, (reader, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=1_000)
-            assert body.count(b"--picture\r\n") > body.count(pictures._STALE)
-            renderer.playing.cancel()
+    async with rendered(mesh, page) as (address, renderer):
+        _, body, (reader, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=1_000)
+        assert body.count(b"--picture\r\n") > body.count(pictures._STALE)
+        renderer.playing.cancel()
+        async with asyncio.timeout(40):
+            body = await pieces_of(reader, 1_000_000)
+        assert body.count(pictures._STALE) >= 2
+        assert body.endswith(pictures._STALE + b"\r\n")
+        writer.close()
+
+
+async def test_a_head_of_a_stream_ends_with_its_headers(mesh, page):  # noqa: F811
+    async with rendered(mesh, page) as (address, _):
+        for ending, kind in (("mjpeg", "multipart/x-mixed-replace"), ("mp4", "video/mp4")):
+            head, _, (reader, writer) = await stream(
+                address, f"/video/s/r/front.{ending}", until_bytes=0, method="HEAD"
+            )
+            assert "200 ok" in head
+            assert kind in head
+            assert "content-length" not in head
+            # The connection accepts another request.
+            writer.write(f"GET /none HTTP/1.1\r\nHost: {address}\r\n\r\n".encode())
             async with asyncio.timeout(40):
-                body = await pieces_of(reader, 1_000_000)
-            assert body.count(pictures._STALE) >= 2
-            assert body.endswith(pictures._STALE + b"\r\n")
+                assert b"404" in await reader.readline()
             writer.close()
-
-    run(main())
-
-
-def test_a_head_of_a_stream_ends_with_its_headers(mesh, page):  # noqa: F811
-    async def main():
-        async with rendered(mesh, page) as (address, _):
-            for ending, kind in (("mjpeg", "multipart/x-mixed-replace"), ("mp4", "video/mp4")):
-                head, _, (reader, writer) = await stream(
-                    address, f"/video/s/r/front.{ending}", until_bytes=0, method="HEAD"
-                )
-                assert "200 ok" in head
-                assert kind in head
-                assert "content-length" not in head
-                # The connection accepts another request.
-                writer.write(f"GET /none HTTP/1.1\r\nHost: {address}\r\n\r\n".encode())
-                async with asyncio.timeout(40):
-                    assert b"404" in await reader.readline()
-                writer.close()
-
-    run(main())
 
 
 def test_a_reader_that_takes_nothing_loses_its_stream():
@@ -217,51 +208,42 @@ def test_a_reader_that_takes_nothing_loses_its_stream():
     assert ended
 
 
-def test_mp4_plays_while_it_happens_until_its_reader_goes(mesh, page):  # noqa: F811
-    async def main():
-        async with rendered(mesh, page) as (address, renderer):
-            head, body, (_, writer) = await stream(address, "/video/s/r/front.mp4", until_bytes=6_000)
-            assert "200 ok" in head
-            assert "video/mp4" in head
-            shades = []
-            with av.open(io.BytesIO(body), format="mp4") as container, suppress(av.FFmpegError):
-                shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
-            assert len({round(shade) for shade in shades}) > 5
+async def test_mp4_plays_while_it_happens_until_its_reader_goes(mesh, page):  # noqa: F811
+    async with rendered(mesh, page) as (address, renderer):
+        head, body, (_, writer) = await stream(address, "/video/s/r/front.mp4", until_bytes=6_000)
+        assert "200 ok" in head
+        assert "video/mp4" in head
+        shades = []
+        with av.open(io.BytesIO(body), format="mp4") as container, suppress(av.FFmpegError):
+            shades += [frame.to_ndarray(format="gray").mean() for frame in container.decode(video=0)]
+        assert len({round(shade) for shade in shades}) > 5
+        writer.close()
+        await unwatched(renderer.videos)
+
+
+async def test_every_mp4_asks_for_a_key_frame_also_one_that_joins_another(mesh, page):  # noqa: F811
+    async with rendered(mesh, page) as (address, renderer):
+        writers = []
+        for readers in (1, 2):
+            _, _, (_, writer) = await stream(address, "/video/s/r/front.mp4", until_bytes=1_000)
+            writers.append(writer)
+            async with asyncio.timeout(40):
+                while len(renderer.key_frames) < readers:
+                    await asyncio.sleep(0.02)
+        for writer in writers:
             writer.close()
-            await unwatched(renderer.videos)
-
-    run(main())
+        await unwatched(renderer.videos)
 
 
-def test_every_mp4_asks_for_a_key_frame_also_one_that_joins_another(mesh, page):  # noqa: F811
-    async def main():
-        async with rendered(mesh, page) as (address, renderer):
-            writers = []
-            for readers in (1, 2):
-                _, _, (_, writer) = await stream(address, "/video/s/r/front.mp4", until_bytes=1_000)
-                writers.append(writer)
-                async with asyncio.timeout(40):
-                    while len(renderer.key_frames) < readers:
-                        await asyncio.sleep(0.02)
-            for writer in writers:
-                writer.close()
-            await unwatched(renderer.videos)
-
-    run(main())
-
-
-def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
-    async def main():
-        async with rendered(mesh, page) as (address, renderer):
-            for ending, kind in (("jpg", "image/jpeg"), ("png", "image/png")):
-                status, headers, body = await get(address, f"/image/s/r/front.{ending}")
-                assert (status, headers["content-type"]) == (200, kind)
-                with av.open(io.BytesIO(body)) as container:
-                    frame = next(container.decode(video=0))
-                assert (frame.width, frame.height) == (WIDTH, HEIGHT)
-            await unwatched(renderer.images)
-
-    run(main())
+async def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
+    async with rendered(mesh, page) as (address, renderer):
+        for ending, kind in (("jpg", "image/jpeg"), ("png", "image/png")):
+            status, headers, body = await get(address, f"/image/s/r/front.{ending}")
+            assert (status, headers["content-type"]) == (200, kind)
+            with av.open(io.BytesIO(body)) as container:
+                frame = next(container.decode(video=0))
+            assert (frame.width, frame.height) == (WIDTH, HEIGHT)
+        await unwatched(renderer.images)
 
 
 @pytest.mark.parametrize(
@@ -279,66 +261,59 @@ def test_a_still_is_the_newest_picture_as_jpeg_or_png(mesh, page):  # noqa: F811
         ("image/S!/r/front.jpg", 404, "request.invalid", "S!"),
     ],
 )
-def test_a_missing_picture_is_refused_with_code_and_sentence(mesh, page, path, status, code, words):  # noqa: F811
-    async def main():
-        async with rendered(mesh, page) as (address, _):
-            answered, headers, body = await get(address, f"/{path}")
-            assert answered == status
-            assert headers.get("retry-after") == ("31" if status == 429 else None)
-            assert words in body.decode()
-            assert read_refusal(headers, body).code == code
-
-    run(main())
+async def test_a_missing_picture_is_refused_with_code_and_sentence(mesh, page, path, status, code, words):  # noqa: F811
+    async with rendered(mesh, page) as (address, _):
+        answered, headers, body = await get(address, f"/{path}")
+        assert answered == status
+        assert headers.get("retry-after") == ("31" if status == 429 else None)
+        assert words in body.decode()
+        assert read_refusal(headers, body).code == code
 
 
-def test_without_a_renderer_the_answer_says_so(mesh, page, monkeypatch):  # noqa: F811
+async def test_without_a_renderer_the_answer_says_so(mesh, page, monkeypatch):  # noqa: F811
     monkeypatch.setattr("services.console.common.requested_views.TIMEOUT_S", 0.3)
 
-    async def main():
-        async with console(mesh, page) as (address, _):
-            status, headers, body = await get(address, "/image/s/r/front.jpg")
-            assert status == 503
-            reason = read_refusal(headers, body)
-            assert (reason.code, reason.values["robot"]) == ("view.no_renderer", "s/r")
-            assert "no renderer answers for s/r" in body.decode()
-
-    run(main())
+    async with console(mesh, page) as (address, _):
+        status, headers, body = await get(address, "/image/s/r/front.jpg")
+        assert status == 503
+        reason = read_refusal(headers, body)
+        assert (reason.code, reason.values["robot"]) == ("view.no_renderer", "s/r")
+        assert "no renderer answers for s/r" in body.decode()
 
 
 @pytest.mark.parametrize("most", ["_MOST_STREAMS", "_MOST_OF_ONE"])
-def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(mesh, page, monkeypatch, most):  # noqa: F811
+async def test_more_streams_than_there_is_room_for_are_refused_and_room_comes_back(
+    mesh,
+    page,  # noqa: F811
+    monkeypatch,
+    most,
+):
     monkeypatch.setattr(pictures, most, 1)
 
-    async def main():
-        async with rendered(mesh, page) as (address, renderer):
-            _, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
-            status, headers, body = await get(address, "/video/s/r/front.mjpeg")
-            assert status == 503
-            suffix = "_of" if most == "_MOST_OF_ONE" else ""
-            assert read_refusal(headers, body).code == f"view.too_many_streams{suffix}"
-            writer.close()
-            await unwatched(renderer.images)
-            head, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
-            assert "200 ok" in head
-            writer.close()
-            await unwatched(renderer.images)
-
-    run(main())
+    async with rendered(mesh, page) as (address, renderer):
+        _, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
+        status, headers, body = await get(address, "/video/s/r/front.mjpeg")
+        assert status == 503
+        suffix = "_of" if most == "_MOST_OF_ONE" else ""
+        assert read_refusal(headers, body).code == f"view.too_many_streams{suffix}"
+        writer.close()
+        await unwatched(renderer.images)
+        head, _, (_, writer) = await stream(address, "/video/s/r/front.mjpeg", until_bytes=100)
+        assert "200 ok" in head
+        writer.close()
+        await unwatched(renderer.images)
 
 
-def test_a_slow_reader_gets_the_newest_picture_next():
+async def test_a_slow_reader_gets_the_newest_picture_next():
     class SharedSubscriptions:
         def join(self, key, sink):
             self.sink = sink
 
-    async def main():
-        feeds = SharedSubscriptions()
-        watch = pictures.Watch(feeds, "robomesh/s/r/image/front", NewestQueue())
-        for number in range(100):
-            key = Key("s", "r", "image/front")
-            sample = Sample(str(key), key, b"", Header(1, number, 0), True, 0.0)
-            feeds.sink(SampleBatch([sample]))
-        assert (await watch.next(1.0)).header.sequence == 99
-        assert await watch.next(0.01) is None
-
-    run(main())
+    feeds = SharedSubscriptions()
+    watch = pictures.NewestSampleReader(feeds, "robomesh/s/r/image/front", NewestQueue())
+    for number in range(100):
+        key = Key("s", "r", "image/front")
+        sample = Sample(str(key), key, b"", Header(1, number, 0), True, 0.0)
+        feeds.sink(SampleBatch([sample]))
+    assert (await watch.next(1.0)).header.sequence == 99
+    assert await watch.next(0.01) is None

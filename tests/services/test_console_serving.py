@@ -94,49 +94,46 @@ class Socket:
         return {"type": "websocket.receive", "bytes": watch.SerializeToString()}
 
 
-def test_a_fast_page_gets_all_in_one_write_and_a_slow_one_the_newest(monkeypatch):
+async def test_a_fast_page_gets_all_in_one_write_and_a_slow_one_the_newest(monkeypatch):
     monkeypatch.setattr(
         "services.console.websocket.framing._SAME_AGE_S", 60.0
     )  # a round may be long on a busy machine
 
-    async def main():
-        feeds, lines = (
-            SharedSubscriptions(),
-            [WebSocketTransport(), WebSocketTransport(), WebSocketTransport()],
-        )
-        browsers = [
-            PageConnection(None, feeds, None, greet=lambda _: ToPage(hello=ToPage.Hello()), site="s")
-            for _ in lines
-        ]
-        serving = [
-            asyncio.create_task(each.run(Socket(line))) for each, line in zip(browsers, lines, strict=True)
-        ]
-        while len(feeds.sinks) < len(lines) or not all(line.written for line in lines):
-            await asyncio.sleep(0)
-        quick, other, slow = lines
-        assert [line.came() for line in lines] == [[], [], []]  # greeted
-        slow.ready = False
-        long_ago = time.monotonic() - 1.0
-        await feeds.give(*(sample(number, received=long_ago) for number in range(1, 4)))
-        assert len(quick.written) == 1
-        assert quick.written[0] is other.written[0]
-        assert quick.came() == [1, 2, 3]
-        await feeds.give(*(sample(number, received=long_ago) for number in range(4, 10)))
-        await feeds.give(sample(10))
-        slow.ready = True
-        slow.on_ready()
-        await feeds.give(sample(11))
-        assert slow.came() == [10, 11]
-        await feeds.give(sample(12), sample(13))
-        assert slow.came() == [12, 13]
-        assert [browser.offered for browser in browsers] == [13, 13, 13]
-        assert [browser.sent for browser in browsers] == [13, 13, 4]
-        for task in serving:
-            task.cancel()
-        await asyncio.gather(*serving, return_exceptions=True)
-        assert not feeds.sinks
-
-    run(main())
+    feeds, lines = (
+        SharedSubscriptions(),
+        [WebSocketTransport(), WebSocketTransport(), WebSocketTransport()],
+    )
+    browsers = [
+        PageConnection(None, feeds, None, greet=lambda _: ToPage(hello=ToPage.Hello()), site="s")
+        for _ in lines
+    ]
+    serving = [
+        asyncio.create_task(each.run(Socket(line))) for each, line in zip(browsers, lines, strict=True)
+    ]
+    while len(feeds.sinks) < len(lines) or not all(line.written for line in lines):
+        await asyncio.sleep(0)
+    quick, other, slow = lines
+    assert [line.came() for line in lines] == [[], [], []]  # greeted
+    slow.ready = False
+    long_ago = time.monotonic() - 1.0
+    await feeds.give(*(sample(number, received=long_ago) for number in range(1, 4)))
+    assert len(quick.written) == 1
+    assert quick.written[0] is other.written[0]
+    assert quick.came() == [1, 2, 3]
+    await feeds.give(*(sample(number, received=long_ago) for number in range(4, 10)))
+    await feeds.give(sample(10))
+    slow.ready = True
+    slow.on_ready()
+    await feeds.give(sample(11))
+    assert slow.came() == [10, 11]
+    await feeds.give(sample(12), sample(13))
+    assert slow.came() == [12, 13]
+    assert [browser.offered for browser in browsers] == [13, 13, 13]
+    assert [browser.sent for browser in browsers] == [13, 13, 4]
+    for task in serving:
+        task.cancel()
+    await asyncio.gather(*serving, return_exceptions=True)
+    assert not feeds.sinks
 
 
 class Asked:
@@ -149,24 +146,21 @@ class Asked:
         self.asked.append(key)
 
 
-def test_a_blocked_page_requests_no_key_frames():
-    async def main():
-        feeds, line, session = SharedSubscriptions(), WebSocketTransport(), Asked()
-        browser = PageConnection(session, feeds, None, greet=lambda _: ToPage(), site="s", own_name="li")
-        serving = asyncio.create_task(browser.run(Socket(line, VIDEO)))
-        while not feeds.sinks:
-            await asyncio.sleep(0)
-        line.ready = False
-        delta = CompressedVideo(data=DELTA).SerializeToString()
-        await feeds.give(sample(1, key=VIDEO, payload=delta))
-        assert session.asked == []
-        line.ready = True
-        await feeds.give(sample(2, key=VIDEO, payload=delta))
-        assert session.asked == [f"{VIDEO}/keyframe/li"]
-        serving.cancel()
-        await asyncio.gather(serving, return_exceptions=True)
-
-    run(main())
+async def test_a_blocked_page_requests_no_key_frames():
+    feeds, line, session = SharedSubscriptions(), WebSocketTransport(), Asked()
+    browser = PageConnection(session, feeds, None, greet=lambda _: ToPage(), site="s", own_name="li")
+    serving = asyncio.create_task(browser.run(Socket(line, VIDEO)))
+    while not feeds.sinks:
+        await asyncio.sleep(0)
+    line.ready = False
+    delta = CompressedVideo(data=DELTA).SerializeToString()
+    await feeds.give(sample(1, key=VIDEO, payload=delta))
+    assert session.asked == []
+    line.ready = True
+    await feeds.give(sample(2, key=VIDEO, payload=delta))
+    assert session.asked == [f"{VIDEO}/keyframe/li"]
+    serving.cancel()
+    await asyncio.gather(serving, return_exceptions=True)
 
 
 def test_encoded_bytes_are_shared_until_the_age_is_updated(monkeypatch):

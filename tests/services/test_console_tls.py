@@ -23,42 +23,39 @@ __all__ = ["page"]  # a fixture
 CLOSE = b"\x88\x80\x00\x00\x00\x00"  # a client's WebSocket frame
 
 
-def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tls(mesh, page, tmp_path):
+async def test_over_tls_the_cookie_is_for_this_host_alone_and_browsers_come_back_by_tls(mesh, page, tmp_path):
     certificate, key = self_signed(tmp_path)
 
-    async def main():
-        path = accounts_file(tmp_path)
-        settings = {"accounts": path, "tls": {"certificate": certificate, "key": key}}
-        async with console(mesh, page, **settings) as (address, _):
-            here = address.removeprefix("https://")
-            trusted = ssl.create_default_context(cafile=certificate)
-            body = json.dumps({"name": "li", "password": "three arms in a hall"}).encode()
-            own = [
-                ("Content-Type", "application/json"),
-                ("Content-Length", len(body)),
-                ("Connection", "close"),
-            ]
-            for origin, status in ((f"http://{here}", b"403"), (f"https://{here}", b"200")):
-                async with connected(here, ssl=trusted) as (reader, writer):
-                    assert writer.get_extra_info("ssl_object").version() in ("TLSv1.2", "TLSv1.3")
-                    asked = [("Origin", origin), *own]
-                    writer.write(http("POST", "/account/sign-in", here, asked, body))
-                    answer = await ended(reader)
-                assert answer.split()[1] == status
-            head = answer.partition(b"\r\n\r\n")[0].decode().lower()
-            assert "strict-transport-security: max-age=" in head
-            assert "set-cookie: __host-robomesh-s=" in head
-            assert "; secure" in head
-            # Plain HTTP, or an unfinished handshake, affects no other client.
-            assert await status_of(here, http("GET", "/", here, [])) == 0
-
-    run(main())
+    path = accounts_file(tmp_path)
+    settings = {"accounts": path, "tls": {"certificate": certificate, "key": key}}
+    async with console(mesh, page, **settings) as (address, _):
+        here = address.removeprefix("https://")
+        trusted = ssl.create_default_context(cafile=certificate)
+        body = json.dumps({"name": "li", "password": "three arms in a hall"}).encode()
+        own = [
+            ("Content-Type", "application/json"),
+            ("Content-Length", len(body)),
+            ("Connection", "close"),
+        ]
+        for origin, status in ((f"http://{here}", b"403"), (f"https://{here}", b"200")):
+            async with connected(here, ssl=trusted) as (reader, writer):
+                assert writer.get_extra_info("ssl_object").version() in ("TLSv1.2", "TLSv1.3")
+                asked = [("Origin", origin), *own]
+                writer.write(http("POST", "/account/sign-in", here, asked, body))
+                answer = await ended(reader)
+            assert answer.split()[1] == status
+        head = answer.partition(b"\r\n\r\n")[0].decode().lower()
+        assert "strict-transport-security: max-age=" in head
+        assert "set-cookie: __host-robomesh-s=" in head
+        assert "; secure" in head
+        # Plain HTTP, or an unfinished handshake, affects no other client.
+        assert await status_of(here, http("GET", "/", here, [])) == 0
 
 
 @pytest.mark.parametrize(
     ("has", "lacks"), [((), "accounts and without TLS"), (("accounts",), "TLS"), (("tls",), "accounts")]
 )
-def test_beyond_loopback_it_needs_accounts_and_tls(mesh, page, tmp_path, has, lacks):
+async def test_beyond_loopback_it_needs_accounts_and_tls(mesh, page, tmp_path, has, lacks):
     certificate, key = self_signed(tmp_path)
     settings = {"listen": "0.0.0.0:0"}
     if "accounts" in has:
@@ -66,18 +63,15 @@ def test_beyond_loopback_it_needs_accounts_and_tls(mesh, page, tmp_path, has, la
     if "tls" in has:
         settings |= {"tls": {"certificate": certificate, "key": key}}
 
-    async def main():
-        with pytest.raises(ListenError, match=f"without {lacks}: give it accounts"):
-            async with console(mesh, page, **settings):
-                pass
-        # With `insecure` it does, and every page shows that.
-        async with console(mesh, page, **settings, insecure=True) as (address, _):
-            assert address.endswith(address.rpartition(":")[2])
-
-    run(main())
+    with pytest.raises(ListenError, match=f"without {lacks}: give it accounts"):
+        async with console(mesh, page, **settings):
+            pass
+    # With `insecure` it does, and every page shows that.
+    async with console(mesh, page, **settings, insecure=True) as (address, _):
+        assert address.endswith(address.rpartition(":")[2])
 
 
-def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_not(
+async def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_not(
     mesh, page, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(uvicorn_server, "_CERTIFICATE_CHECK_EVERY_S", 0.02)
@@ -87,24 +81,21 @@ def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_one_is_n
     anyone = ssl.create_default_context()
     anyone.check_hostname, anyone.verify_mode = False, ssl.CERT_NONE
 
-    async def main():
-        async with console(mesh, page, tls={"certificate": certificate, "key": key}) as (address, _):
+    async with console(mesh, page, tls={"certificate": certificate, "key": key}) as (address, _):
 
-            async def shown():
-                async with connected(address.removeprefix("https://"), ssl=anyone) as (_, writer):
-                    return writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
+        async def shown():
+            async with connected(address.removeprefix("https://"), ssl=anyone) as (_, writer):
+                return writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
 
-            first = await shown()
-            renewed.replace(certificate)
-            for _ in range(5):
-                await asyncio.sleep(0.05)
-                assert await shown() == first
-            renewed_key.replace(key)
-            async with asyncio.timeout(ENDS_S):
-                while await shown() == first:
-                    await asyncio.sleep(0.02)
-
-    run(main())
+        first = await shown()
+        renewed.replace(certificate)
+        for _ in range(5):
+            await asyncio.sleep(0.05)
+            assert await shown() == first
+        renewed_key.replace(key)
+        async with asyncio.timeout(ENDS_S):
+            while await shown() == first:
+                await asyncio.sleep(0.02)
 
 
 def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, tmp_path):
@@ -133,17 +124,14 @@ def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, t
     assert not unclosed
 
 
-def test_an_invalid_certificate_is_named(mesh, page, tmp_path):
+async def test_an_invalid_certificate_is_named(mesh, page, tmp_path):
     (tmp_path / "c.pem").write_text("no certificate")
 
-    async def main():
-        for certificate, why in (
-            (tmp_path / "c.pem", "not a certificate"),
-            (tmp_path / "d.pem", "No such file"),
-        ):
-            with pytest.raises(ListenError, match=why) as refused:
-                async with console(mesh, page, tls={"certificate": certificate, "key": certificate}):
-                    pass
-            assert certificate.name in str(refused.value)
-
-    run(main())
+    for certificate, why in (
+        (tmp_path / "c.pem", "not a certificate"),
+        (tmp_path / "d.pem", "No such file"),
+    ):
+        with pytest.raises(ListenError, match=why) as refused:
+            async with console(mesh, page, tls={"certificate": certificate, "key": certificate}):
+                pass
+        assert certificate.name in str(refused.value)

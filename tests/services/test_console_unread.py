@@ -8,7 +8,6 @@ from robomesh.wire.session import open_session
 from services.console.common.requested_views import Views
 from services.console.websocket.page_connection import PageConnection
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
-from tests.conftest import run
 from tests.services.test_console import browse, console, page
 
 __all__ = ["page"]  # a fixture
@@ -44,30 +43,24 @@ class Deaf:
         await asyncio.Event().wait()
 
 
-def test_a_page_that_asks_and_never_reads_is_cut_off(mesh, monkeypatch):
+async def test_a_page_that_asks_and_never_reads_is_cut_off(mesh, monkeypatch):
     monkeypatch.setattr("services.console.websocket.send_order.MOST_UNREAD", 20_000)
     monkeypatch.setattr("services.console.websocket.page_connection._CLOSED_WITHIN_S", 0.05)
 
-    async def main():
-        async with open_session(mesh) as session:
-            feeds, deaf = SharedSubscriptions(session), Deaf()
-            browser = PageConnection(session, feeds, Views(session), greet=lambda _: ToPage(), site="s")
-            async with asyncio.timeout(30.0):
-                await browser.run(deaf)
-            assert 10 < deaf.asked < 2000
-            assert browser._order.unread_bytes <= 22_000  # and the message that exceeded the limit
-            feeds.close()
-
-    run(main())
+    async with open_session(mesh) as session:
+        feeds, deaf = SharedSubscriptions(session), Deaf()
+        browser = PageConnection(session, feeds, Views(session), greet=lambda _: ToPage(), site="s")
+        async with asyncio.timeout(30.0):
+            await browser.run(deaf)
+        assert 10 < deaf.asked < 2000
+        assert browser._order.unread_bytes <= 22_000  # and the message that exceeded the limit
+        feeds.close()
 
 
-def test_a_long_key_is_refused_without_being_repeated(mesh, page):
-    async def main():
-        async with console(mesh, page) as (address, _), browse(address) as browser:
-            answer = await browser.ask(1, LONG)
-            assert (answer.ok, answer.error) == (
-                False,
-                "the key has 900013 characters: at most 200 are allowed",
-            )
-
-    run(main())
+async def test_a_long_key_is_refused_without_being_repeated(mesh, page):
+    async with console(mesh, page) as (address, _), browse(address) as browser:
+        answer = await browser.ask(1, LONG)
+        assert (answer.ok, answer.error) == (
+            False,
+            "the key has 900013 characters: at most 200 are allowed",
+        )

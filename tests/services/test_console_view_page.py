@@ -8,7 +8,6 @@ from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 
 from robomesh.schemas.robomesh_pb2 import ControllerState, Description, ToPage
 from services.console.http import view_page
-from tests.conftest import run
 from tests.services.http_refusals import read_refusal
 from tests.services.test_console import console, get, page
 from tests.services.test_console_pictures import rendered, rendering, unwatched
@@ -71,51 +70,45 @@ def state(**more):
     return said
 
 
-def test_the_stream_has_the_picture_and_the_state_without_names_and_texts(mesh, page):
-    async def main():
-        async with rendered(mesh, page) as (address, renderer), console(mesh, page) as (_, robot):
-            controllers = robot.declare_publisher("s", "r", "controller")
-            described = Description(simulated=True, urdf="<robot/>")
-            described_by = robot.declare_publisher("s", "r", "description")
-            status, view = await live_view(address)
-            assert status == 200
+async def test_the_stream_has_the_picture_and_the_state_without_names_and_texts(mesh, page):
+    async with rendered(mesh, page) as (address, renderer), console(mesh, page) as (_, robot):
+        controllers = robot.declare_publisher("s", "r", "controller")
+        described = Description(simulated=True, urdf="<robot/>")
+        described_by = robot.declare_publisher("s", "r", "description")
+        status, view = await live_view(address)
+        assert status == 200
 
-            def whole():
-                controllers.put(state(fault="E42: axis 3"))
-                described_by.put(described)
-                return len(view.samples) == 3 and len(view.greetings) > 1
+        def whole():
+            controllers.put(state(fault="E42: axis 3"))
+            described_by.put(described)
+            return len(view.samples) == 3 and len(view.greetings) > 1
 
-            await view.until(whole)
-            picture = CompressedImage.FromString(view.samples["robomesh/s/r/image/front"].payload)
-            assert picture.data[:2] == b"\xff\xd8"
-            assert view.samples["robomesh/s/r/image/front"].age_s < 40.0
-            shown = ControllerState.FromString(view.samples["robomesh/s/r/controller"].payload)
-            assert (shown.activity, shown.stop.sent) == (ControllerState.IDLE, True)
-            assert shown.fault
-            assert "E42" not in shown.fault
-            assert shown.stop.by == shown.link_text == ""
-            told = Description.FromString(view.samples["robomesh/s/r/description"].payload)
-            assert told == Description(simulated=True)
-            assert all(hello.connected and not hello.operator for hello in view.greetings)
-            view.close()
-            await unwatched(renderer.images)
-
-    run(main())
+        await view.until(whole)
+        picture = CompressedImage.FromString(view.samples["robomesh/s/r/image/front"].payload)
+        assert picture.data[:2] == b"\xff\xd8"
+        assert view.samples["robomesh/s/r/image/front"].age_s < 40.0
+        shown = ControllerState.FromString(view.samples["robomesh/s/r/controller"].payload)
+        assert (shown.activity, shown.stop.sent) == (ControllerState.IDLE, True)
+        assert shown.fault
+        assert "E42" not in shown.fault
+        assert shown.stop.by == shown.link_text == ""
+        told = Description.FromString(view.samples["robomesh/s/r/description"].payload)
+        assert told == Description(simulated=True)
+        assert all(hello.connected and not hello.operator for hello in view.greetings)
+        view.close()
+        await unwatched(renderer.images)
 
 
-def test_a_stream_whose_pictures_end_goes_on_so_that_the_page_says_so(mesh, page, monkeypatch):
+async def test_a_stream_whose_pictures_end_goes_on_so_that_the_page_says_so(mesh, page, monkeypatch):
     monkeypatch.setattr(view_page, "_GREETS_EACH_S", 0.05)
 
-    async def main():
-        async with rendered(mesh, page) as (address, renderer):
-            _, view = await live_view(address)
-            await view.until(lambda: view.samples)
-            renderer.playing.cancel()
-            last = len(view.greetings)
-            await view.until(lambda: len(view.greetings) > last + 5)
-            view.close()
-
-    run(main())
+    async with rendered(mesh, page) as (address, renderer):
+        _, view = await live_view(address)
+        await view.until(lambda: view.samples)
+        renderer.playing.cancel()
+        last = len(view.greetings)
+        await view.until(lambda: len(view.greetings) > last + 5)
+        view.close()
 
 
 @pytest.mark.parametrize(
@@ -127,42 +120,36 @@ def test_a_stream_whose_pictures_end_goes_on_so_that_the_page_says_so(mesh, page
         ("/view/s/r/front/live/more", 404, "http.no_path"),
     ],
 )
-def test_a_missing_view_is_refused_with_its_code(mesh, page, path, status, code):
-    async def main():
-        async with console(mesh, page) as (address, other), rendering(other):
-            answered, headers, body = await get(address, path)
-            assert (answered, read_refusal(headers, body).code) == (status, code)
-
-    run(main())
+async def test_a_missing_view_is_refused_with_its_code(mesh, page, path, status, code):
+    async with console(mesh, page) as (address, other), rendering(other):
+        answered, headers, body = await get(address, path)
+        assert (answered, read_refusal(headers, body).code) == (status, code)
 
 
 @pytest.mark.parametrize("embed", [(), (LISTED, "http://10.0.0.9:8000")])
-def test_only_the_page_of_a_view_can_be_in_a_frame_and_only_of_listed_origins(mesh, page, embed):
-    async def main():
-        async with console(mesh, page, embed=embed) as (address, _):
-            framed = {}
-            for path in (
-                "/view/s/r/front",
-                "/",
-                "/view/..%2Findex.html",
-                "/view/s/r/front/../../../../index.html",
-                "/view/s/r/front%2F..%2F..%2F..%2F..%2Findex.html",
-                "/view//../index.html",
-                "/view/s/r/front/",
-                "/VIEW/s/r/front",
-                "/view/s/r/front/live",
-                "/view.html",
-                "/image/..%2Findex.html",
-                "/video/s/r/front.mp4",
-            ):
-                _, headers, body = await get(address, path)
-                policy = dict(rule.split(" ", 1) for rule in headers["content-security-policy"].split("; "))
-                framed[path] = policy["frame-ancestors"]
-                assert ("x-frame-options" in headers) == (framed[path] == "'none'"), path
-                if b"<title>page</title>" in body:
-                    assert framed[path] == "'none'", path
-            others = set(framed.values()) if not embed else {framed.pop("/view/s/r/front"), *framed.values()}
-            assert others == ({"'none'"} if not embed else {" ".join(embed), "'none'"})
-            assert set(framed.values()) == {"'none'"}
-
-    run(main())
+async def test_only_the_page_of_a_view_can_be_in_a_frame_and_only_of_listed_origins(mesh, page, embed):
+    async with console(mesh, page, embed=embed) as (address, _):
+        framed = {}
+        for path in (
+            "/view/s/r/front",
+            "/",
+            "/view/..%2Findex.html",
+            "/view/s/r/front/../../../../index.html",
+            "/view/s/r/front%2F..%2F..%2F..%2F..%2Findex.html",
+            "/view//../index.html",
+            "/view/s/r/front/",
+            "/VIEW/s/r/front",
+            "/view/s/r/front/live",
+            "/view.html",
+            "/image/..%2Findex.html",
+            "/video/s/r/front.mp4",
+        ):
+            _, headers, body = await get(address, path)
+            policy = dict(rule.split(" ", 1) for rule in headers["content-security-policy"].split("; "))
+            framed[path] = policy["frame-ancestors"]
+            assert ("x-frame-options" in headers) == (framed[path] == "'none'"), path
+            if b"<title>page</title>" in body:
+                assert framed[path] == "'none'", path
+        others = set(framed.values()) if not embed else {framed.pop("/view/s/r/front"), *framed.values()}
+        assert others == ({"'none'"} if not embed else {" ".join(embed), "'none'"})
+        assert set(framed.values()) == {"'none'"}

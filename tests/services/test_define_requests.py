@@ -25,7 +25,7 @@ from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
 from services.site_file.site import Define as DefinePart
 from services.site_file.site import Site
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 from tests.services.defining import defining
 from tests.site import wait_until
 
@@ -421,24 +421,21 @@ def test_a_running_robot_of_the_pages_reads_its_own_folder_only(tmp_path, monkey
 
 
 @pytest.mark.parametrize("job", ["mesh", "collisions", "import_robot", "unzip"])
-def test_an_abandoned_job_delays_no_other(tmp_path, job):
+async def test_an_abandoned_job_delays_no_other(tmp_path, job):
     site = Site(site="s", define=DefinePart(folder=tmp_path / "robots"))
 
-    async def main():
-        define = Define(DefineSettings(site=site, store=tmp_path / "store"))
-        asked = {"file": "a.wrl", "files": {"a.wrl": store.put(define.store, TRIANGLE)}, "description": {}}
-        came = [{"type": "http.request", "body": json.dumps(asked).encode()}]
+    define = Define(DefineSettings(site=site, store=tmp_path / "store"))
+    asked = {"file": "a.wrl", "files": {"a.wrl": store.put(define.store, TRIANGLE)}, "description": {}}
+    came = [{"type": "http.request", "body": json.dumps(asked).encode()}]
 
-        async def receive():
-            return came.pop() if came else {"type": "http.disconnect"}
+    async def receive():
+        return came.pop() if came else {"type": "http.disconnect"}
 
-        request = Request({"type": "http", "method": "POST", "headers": []}, receive)
-        with pytest.raises(RefusedRequest, match="has disconnected"):
-            await getattr(define, job)(request)
-        assert define.workshop.slow.pids == []
-        await define.close()
-
-    run(main())
+    request = Request({"type": "http", "method": "POST", "headers": []}, receive)
+    with pytest.raises(RefusedRequest, match="has disconnected"):
+        await getattr(define, job)(request)
+    assert define.workshop.slow.pids == []
+    await define.close()
 
 
 def test_only_so_many_files_are_taken_at_once(page, monkeypatch):

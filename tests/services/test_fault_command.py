@@ -13,7 +13,6 @@ from controllers.universal_robots.simulated.server import UR_FAULTS
 from controllers.universal_robots.simulated.service import UrSettings, serve_rtde
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.watch.monitor import link_words
-from tests.conftest import run
 from tests.site import robomesh
 
 STATE = schema.ControllerState
@@ -23,52 +22,46 @@ async def ask(*arguments):
     return await asyncio.to_thread(robomesh, *arguments)
 
 
-def test_fault_begins_ends_and_lists_faults(mesh, router):
-    async def main():
-        own = Mesh(site="hall", robot="arm", session=mesh)
-        ready = asyncio.get_running_loop().create_future()
-        task = asyncio.create_task(serve(Settings(robot="pt600", mesh=own), ready=ready.set_result))
-        await ready
-        try:
-            to = ("--connect", router)
-            begun = await ask("fault", "arm", "garbage", *to)
-            assert (begun.returncode, begun.stdout) == (0, "faults now: garbage\n"), begun.stderr
-            listed = await ask("fault", "arm", *to)
-            assert [line[2:].split()[0] for line in listed.stdout.splitlines()] == list(UNIT_FAULTS)
-            assert "* garbage" in listed.stdout
-            printed = json.loads((await ask("fault", "hall/arm", "garbage", "--off", "--json", *to)).stdout)
-            assert printed == {"active": [], "known": list(UNIT_FAULTS)}
-            unknown = await ask("fault", "arm", "melt", *to)
-            assert unknown.returncode == 2
-            assert "'melt' is unknown; there are freeze, garbage" in unknown.stderr
-            assert unknown.stderr.count("\n") == 1
-        finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
-
-    run(main(), timeout_s=60.0)
+async def test_fault_begins_ends_and_lists_faults(mesh, router):
+    own = Mesh(site="hall", robot="arm", session=mesh)
+    ready = asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(serve(Settings(robot="pt600", mesh=own), ready=ready.set_result))
+    await ready
+    try:
+        to = ("--connect", router)
+        begun = await ask("fault", "arm", "garbage", *to)
+        assert (begun.returncode, begun.stdout) == (0, "faults now: garbage\n"), begun.stderr
+        listed = await ask("fault", "arm", *to)
+        assert [line[2:].split()[0] for line in listed.stdout.splitlines()] == list(UNIT_FAULTS)
+        assert "* garbage" in listed.stdout
+        printed = json.loads((await ask("fault", "hall/arm", "garbage", "--off", "--json", *to)).stdout)
+        assert printed == {"active": [], "known": list(UNIT_FAULTS)}
+        unknown = await ask("fault", "arm", "melt", *to)
+        assert unknown.returncode == 2
+        assert "'melt' is unknown; there are freeze, garbage" in unknown.stderr
+        assert unknown.stderr.count("\n") == 1
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
 
 
 @pytest.mark.slow
-def test_fault_that_a_controller_cannot_show_is_refused(mesh, router):
-    async def main():
-        own = Mesh(site="hall", robot="ur", session=mesh)
-        ready = asyncio.get_running_loop().create_future()
-        settings = UrSettings(mesh=own)
-        task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
-        await ready
-        try:
-            to = ("--connect", router)
-            begun = await ask("fault", "ur", "freeze", "--json", *to)
-            assert json.loads(begun.stdout) == {"active": ["freeze"], "known": list(UR_FAULTS)}
-            mute = await ask("fault", "ur", "mute", *to)
-            assert mute.returncode == 2
-            assert "fault 'mute' is unknown; there are freeze, garbage" in mute.stderr
-        finally:
-            task.cancel()
-            await asyncio.wait([task])
-
-    run(main())
+async def test_fault_that_a_controller_cannot_show_is_refused(mesh, router):
+    own = Mesh(site="hall", robot="ur", session=mesh)
+    ready = asyncio.get_running_loop().create_future()
+    settings = UrSettings(mesh=own)
+    task = asyncio.create_task(serve_rtde(settings, ready=ready.set_result))
+    await ready
+    try:
+        to = ("--connect", router)
+        begun = await ask("fault", "ur", "freeze", "--json", *to)
+        assert json.loads(begun.stdout) == {"active": ["freeze"], "known": list(UR_FAULTS)}
+        mute = await ask("fault", "ur", "mute", *to)
+        assert mute.returncode == 2
+        assert "fault 'mute' is unknown; there are freeze, garbage" in mute.stderr
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
 
 
 @pytest.mark.slow

@@ -70,34 +70,28 @@ def test_job_of_a_killed_worker_fails_and_the_next_job_is_done(tmp_path):
     assert state_of(second) is State.INDEXED
 
 
-def test_problem_of_a_job_is_a_text_and_the_worker_goes_on(tmp_path):
+async def test_problem_of_a_job_is_a_text_and_the_worker_goes_on(tmp_path):
     recording = tmp_path / "recording.mcap"
     write(recording, range(100))
     damaged = tmp_path / "damaged.mcap"
     damaged.write_bytes(b"no recording")
 
-    async def main():
-        async with serving() as finisher:
-            assert "damaged.mcap: not a readable recording" in await submit(finisher, damaged)
-            first = worker_process()
-            assert "No such file" in await submit(finisher, tmp_path / "missing.mcap")
-            assert await submit(finisher, recording) is None
-            assert worker_process() == first
-
-    run(main(), timeout_s=120)
+    async with serving() as finisher:
+        assert "damaged.mcap: not a readable recording" in await submit(finisher, damaged)
+        first = worker_process()
+        assert "No such file" in await submit(finisher, tmp_path / "missing.mcap")
+        assert await submit(finisher, recording) is None
+        assert worker_process() == first
 
 
-def test_worker_of_an_idle_queue_is_ended_and_restarted(tmp_path, monkeypatch):
+async def test_worker_of_an_idle_queue_is_ended_and_restarted(tmp_path, monkeypatch):
     monkeypatch.setattr(finishing, "_IDLE_S", 0.01)
     recording = tmp_path / "recording.mcap"
     write(recording, range(100))
 
-    async def main():
-        async with serving() as finisher:
-            assert await submit(finisher, recording) is None
-            async with asyncio.timeout(60):
-                while worker_process() is not None:
-                    await asyncio.sleep(0.02)
-            assert await submit(finisher, recording) is None
-
-    run(main(), timeout_s=120)
+    async with serving() as finisher:
+        assert await submit(finisher, recording) is None
+        async with asyncio.timeout(60):
+            while worker_process() is not None:
+                await asyncio.sleep(0.02)
+        assert await submit(finisher, recording) is None

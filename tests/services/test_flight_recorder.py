@@ -209,10 +209,7 @@ def test_only_old_segments_are_removed(mesh, tmp_path, monkeypatch):
     assert not list(tmp_path.glob(SAVED))
 
 
-def test_without_a_flight_recorder_a_save_is_refused(mesh, tmp_path):
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            with refused(codes.FLIGHT_NONE):
-                await session.ask(KEY, Ask(action=Ask.SAVE), timeout_s=WITHIN_S)
-
-    run(main())
+async def test_without_a_flight_recorder_a_save_is_refused(mesh, tmp_path):
+    async with recording_site(mesh, tmp_path) as session:
+        with refused(codes.FLIGHT_NONE):
+            await session.ask(KEY, Ask(action=Ask.SAVE), timeout_s=WITHIN_S)

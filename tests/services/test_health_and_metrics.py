@@ -23,7 +23,6 @@ from robomesh.service.loop_turns import LONG_S, MeasuredLoop
 from robomesh.service.metrics import SessionMetrics, serve_metrics
 from robomesh.wire.session import open_session
 from services.watch.rules import RULES
-from tests.conftest import run
 from tests.site import robomesh, wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,159 +45,139 @@ def scrape(url: str) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
     return found
 
 
-def test_a_process_tells_who_it_is_and_what_it_has_done(mesh):
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
-            gateway.measure("captures", "of its own", lambda: 7)
-            gateway.measure("link_up", "of each robot", lambda: {"arm": 1.0})
-            async with present(gateway, GATEWAY):
-                joints = gateway.declare_publisher("s", "arm", "joints")
-                for _ in range(5):
-                    joints.put(JointStates())
-                async for sample in monitor.subscribe("robomesh/s/-/health/*", newest=10):
-                    health = sample.message()
-                    if health.published >= 5:
-                        break
-                there = {("arm", "gateway"), ("other", "gateway")}
-                while not there <= {(key.robot, key.service) for key in await monitor.present()}:
-                    await asyncio.sleep(0.05)
-            assert sample.key == f"robomesh/s/-/health/gateway.{gateway.identity}"
-            assert (health.service, health.id, health.pid) == ("gateway", gateway.identity, os.getpid())
-            assert list(health.robots) == ["arm", "other"]
-            assert health.version == own_version()
-            assert health.memory_bytes > 1e6
-            assert health.open_files > 3
-            # Numbers of each robot are in its topics and its metrics.
-            assert dict(health.values) == {"captures": 7.0}
-
-    run(main())
+async def test_a_process_tells_who_it_is_and_what_it_has_done(mesh):
+    async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+        gateway.measure("captures", "of its own", lambda: 7)
+        gateway.measure("link_up", "of each robot", lambda: {"arm": 1.0})
+        async with present(gateway, GATEWAY):
+            joints = gateway.declare_publisher("s", "arm", "joints")
+            for _ in range(5):
+                joints.put(JointStates())
+            async for sample in monitor.subscribe("robomesh/s/-/health/*", newest=10):
+                health = sample.message()
+                if health.published >= 5:
+                    break
+            there = {("arm", "gateway"), ("other", "gateway")}
+            while not there <= {(key.robot, key.service) for key in await monitor.present()}:
+                await asyncio.sleep(0.05)
+        assert sample.key == f"robomesh/s/-/health/gateway.{gateway.identity}"
+        assert (health.service, health.id, health.pid) == ("gateway", gateway.identity, os.getpid())
+        assert list(health.robots) == ["arm", "other"]
+        assert health.version == own_version()
+        assert health.memory_bytes > 1e6
+        assert health.open_files > 3
+        # Numbers of each robot are in its topics and its metrics.
+        assert dict(health.values) == {"captures": 7.0}
 
 
-def test_prometheus_reads_counts_ages_latencies_and_the_services_own(mesh):
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
-            gateway.measure("units_received_total", "of each robot", lambda: {"arm": 12.0})
-            gateway.measure("captures", "of its own", lambda: 3)
-            gateway.measure("alarms_active", "by priority", lambda: {"high": 2}, labels=("priority",))
-            url = serve_metrics(gateway, "127.0.0.1", 0, {"service": "gateway"})
-            monitored = serve_metrics(monitor, "127.0.0.1", 0, {"service": "monitor"})
-            async with present(gateway, GATEWAY):
-                subscription = monitor.subscribe("robomesh/*/*/joints", newest=100)
-                joints = gateway.declare_publisher("s", "arm", "joints")
-                while not joints.watched:
-                    await asyncio.sleep(0.01)
-                for _ in range(4):
-                    joints.put(JointStates())
-                for _ in range(4):
-                    await anext(subscription)
-                await read_clock(monitor, "s", gateway.identity)
-                joints.close()
-                # A closed publisher remains in the counters, also after another declaration.
-                gateway.declare_publisher("s", "arm", "lease")
-                found, there = await scraped(url), await scraped(monitored)
-            topic = (("topic", "joints"),)
-            assert found["robomesh_published_total"][topic] == 4
-            assert found["robomesh_units_received_total"] == {(("robot", "arm"),): 12.0}
-            assert found["robomesh_captures"] == {(): 3.0}
-            assert found["robomesh_alarms_active"] == {(("priority", "high"),): 2.0}
-            assert found["robomesh_connected"] == {(): 1.0}
-            clock = (("request", "clock/*"),)
-            assert found["robomesh_request_seconds_count"][clock] == 1
-            steps = [
-                value
-                for labels, value in found["robomesh_request_seconds_bucket"].items()
-                if dict(labels)["request"] == "clock/*"
-            ]
-            assert steps == sorted(steps)
-            assert steps[-1] == 1
-            assert found["process_resident_memory_bytes"][()] > 1e6
-            assert there["robomesh_received_total"][topic] == 4
-            assert there["robomesh_lost_total"][topic] == 0
-            age = there["robomesh_age_seconds"][(("robot", "arm"), ("site", "s"), ("topic", "joints"))]
-            assert 0.0 <= age < 30.0
-
-    run(main())
+async def test_prometheus_reads_counts_ages_latencies_and_the_services_own(mesh):
+    async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+        gateway.measure("units_received_total", "of each robot", lambda: {"arm": 12.0})
+        gateway.measure("captures", "of its own", lambda: 3)
+        gateway.measure("alarms_active", "by priority", lambda: {"high": 2}, labels=("priority",))
+        url = serve_metrics(gateway, "127.0.0.1", 0, {"service": "gateway"})
+        monitored = serve_metrics(monitor, "127.0.0.1", 0, {"service": "monitor"})
+        async with present(gateway, GATEWAY):
+            subscription = monitor.subscribe("robomesh/*/*/joints", newest=100)
+            joints = gateway.declare_publisher("s", "arm", "joints")
+            while not joints.watched:
+                await asyncio.sleep(0.01)
+            for _ in range(4):
+                joints.put(JointStates())
+            for _ in range(4):
+                await anext(subscription)
+            await read_clock(monitor, "s", gateway.identity)
+            joints.close()
+            # A closed publisher remains in the counters, also after another declaration.
+            gateway.declare_publisher("s", "arm", "lease")
+            found, there = await scraped(url), await scraped(monitored)
+        topic = (("topic", "joints"),)
+        assert found["robomesh_published_total"][topic] == 4
+        assert found["robomesh_units_received_total"] == {(("robot", "arm"),): 12.0}
+        assert found["robomesh_captures"] == {(): 3.0}
+        assert found["robomesh_alarms_active"] == {(("priority", "high"),): 2.0}
+        assert found["robomesh_connected"] == {(): 1.0}
+        clock = (("request", "clock/*"),)
+        assert found["robomesh_request_seconds_count"][clock] == 1
+        steps = [
+            value
+            for labels, value in found["robomesh_request_seconds_bucket"].items()
+            if dict(labels)["request"] == "clock/*"
+        ]
+        assert steps == sorted(steps)
+        assert steps[-1] == 1
+        assert found["process_resident_memory_bytes"][()] > 1e6
+        assert there["robomesh_received_total"][topic] == 4
+        assert there["robomesh_lost_total"][topic] == 0
+        age = there["robomesh_age_seconds"][(("robot", "arm"), ("site", "s"), ("topic", "joints"))]
+        assert 0.0 <= age < 30.0
 
 
-def test_processes_that_come_and_go_leave_neither_series_nor_keys(mesh, monkeypatch):
+async def test_processes_that_come_and_go_leave_neither_series_nor_keys(mesh, monkeypatch):
     monkeypatch.setattr(subscription_module, "_FORGET_EACH_S", 0.0)
     monkeypatch.setattr(subscription_module, "_FORGOTTEN_AFTER_S", 0.0)
 
-    async def main():
-        async with open_session(mesh) as service, open_session(mesh) as monitor:
-            healths = monitor.subscribe("robomesh/s/-/health/*", newest=1, history=False)
-            for n in range(3):
-                publisher = service.declare_publisher("s", "-", f"health/gateway.{n}")
-                while not publisher.watched:
-                    await asyncio.sleep(0.01)
-                publisher.put(ServiceHealth(service="gateway"))
-                while healths.received <= n:
-                    await asyncio.sleep(0.01)
-            assert [*healths.ages_s()] == [Key("s", "-", "health/gateway.2")]
-            assert (healths.received, healths.skipped) == (3, 2)
-            ages = next(
-                each for each in SessionMetrics(monitor, {}).collect() if each.name == "robomesh_age_seconds"
-            )
-            row = {"site": "s", "robot": "-", "topic": "health/*"}
-            assert [sample.labels for sample in ages.samples] == [row]
-
-    run(main())
+    async with open_session(mesh) as service, open_session(mesh) as monitor:
+        healths = monitor.subscribe("robomesh/s/-/health/*", newest=1, history=False)
+        for n in range(3):
+            publisher = service.declare_publisher("s", "-", f"health/gateway.{n}")
+            while not publisher.watched:
+                await asyncio.sleep(0.01)
+            publisher.put(ServiceHealth(service="gateway"))
+            while healths.received <= n:
+                await asyncio.sleep(0.01)
+        assert [*healths.ages_s()] == [Key("s", "-", "health/gateway.2")]
+        assert (healths.received, healths.skipped) == (3, 2)
+        ages = next(
+            each for each in SessionMetrics(monitor, {}).collect() if each.name == "robomesh_age_seconds"
+        )
+        row = {"site": "s", "robot": "-", "topic": "health/*"}
+        assert [sample.labels for sample in ages.samples] == [row]
 
 
 @pytest.mark.slow
-def test_the_heartbeat_ages_while_the_event_loop_hangs(mesh):
-    async def main():
-        async with open_session(mesh) as session:
-            url = serve_metrics(session, "127.0.0.1", 0, {})
+async def test_the_heartbeat_ages_while_the_event_loop_hangs(mesh):
+    async with open_session(mesh) as session:
+        url = serve_metrics(session, "127.0.0.1", 0, {})
 
-            def hangs() -> bool:
-                return scrape(url)["robomesh_heartbeat_age_seconds"][()] > 1.5
+        def hangs() -> bool:
+            return scrape(url)["robomesh_heartbeat_age_seconds"][()] > 1.5
 
-            wait_until(hangs, what="the heartbeat goes on")  # blocks the event loop
-            async with asyncio.timeout(40.0):
-                while await asyncio.to_thread(hangs):
-                    await asyncio.sleep(0.05)
-
-    run(main())
+        wait_until(hangs, what="the heartbeat goes on")  # blocks the event loop
+        async with asyncio.timeout(40.0):
+            while await asyncio.to_thread(hangs):
+                await asyncio.sleep(0.05)
 
 
-def test_a_service_without_its_metrics_runs_and_says_so_and_listens_when_it_can(mesh, monkeypatch):
+async def test_a_service_without_its_metrics_runs_and_says_so_and_listens_when_it_can(mesh, monkeypatch):
     monkeypatch.setattr("robomesh.service.health._LISTEN_AGAIN_S", 0.1)
 
-    async def main():
-        with socket.create_server(("127.0.0.1", 0)) as other:
-            port = other.getsockname()[1]
-            served = Served(service="gateway", present_for=(("s", "arm"),), metrics=("127.0.0.1", port))
-            async with open_session(mesh) as session, present(session, served):
-                measured = health_of(session, served)
-                while not (problems := measured().problems):
-                    await asyncio.sleep(0.02)
-                assert problems[0].text.startswith(
-                    f"metrics cannot listen on 127.0.0.1:{port}: Address already"
-                )
-                other.close()
-                while measured().problems:
-                    await asyncio.sleep(0.02)
-                assert await asyncio.to_thread(scrape, f"http://127.0.0.1:{port}/metrics")
-
-    run(main())
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        served = Served(service="gateway", present_for=(("s", "arm"),), metrics=("127.0.0.1", port))
+        async with open_session(mesh) as session, present(session, served):
+            measured = health_of(session, served)
+            while not (problems := measured().problems):
+                await asyncio.sleep(0.02)
+            assert problems[0].text.startswith(f"metrics cannot listen on 127.0.0.1:{port}: Address already")
+            other.close()
+            while measured().problems:
+                await asyncio.sleep(0.02)
+            assert await asyncio.to_thread(scrape, f"http://127.0.0.1:{port}/metrics")
 
 
-def test_only_the_process_that_is_asked_answers_for_its_clock(mesh):
-    async def main():
-        async with open_session(mesh) as one, open_session(mesh) as other, open_session(mesh) as asker:
-            async with present(one, GATEWAY), present(other, GATEWAY):
-                for each in (one, other):
-                    reading = await read_clock(asker, "s", each.identity, hops=True, timeout_s=10.0)
-                    assert abs(reading.offset_s) <= reading.round_trip_s / 2 + 1e-3
-                    # To the router, and from it to the process.
-                    assert len(reading.hops) == 2
-                    assert reading.hops[0][1] == reading.hops[1][0]
-                    assert all(seconds >= 0 for _, _, seconds in reading.hops)
-            with pytest.raises(NoAnswerError, match="no answer"):
-                await read_clock(asker, "s", "nobody", timeout_s=0.2)
-
-    run(main())
+async def test_only_the_process_that_is_asked_answers_for_its_clock(mesh):
+    async with open_session(mesh) as one, open_session(mesh) as other, open_session(mesh) as asker:
+        async with present(one, GATEWAY), present(other, GATEWAY):
+            for each in (one, other):
+                reading = await read_clock(asker, "s", each.identity, hops=True, timeout_s=10.0)
+                assert abs(reading.offset_s) <= reading.round_trip_s / 2 + 1e-3
+                # To the router, and from it to the process.
+                assert len(reading.hops) == 2
+                assert reading.hops[0][1] == reading.hops[1][0]
+                assert all(seconds >= 0 for _, _, seconds in reading.hops)
+        with pytest.raises(NoAnswerError, match="no answer"):
+            await read_clock(asker, "s", "nobody", timeout_s=0.2)
 
 
 @pytest.mark.parametrize(

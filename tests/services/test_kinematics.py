@@ -20,7 +20,7 @@ from robots.schema.poses import rpy_rotation
 from services import kinematics
 from services.kinematics.states import FramesMessage, kinematic_state, quaternion
 from tests.cells import single_arm
-from tests.conftest import last_value, run
+from tests.conftest import last_value
 from tests.refusals import refused
 
 angles = st.floats(-np.pi, np.pi)
@@ -135,70 +135,61 @@ def states_of(positions) -> JointStates:
     return message
 
 
-def test_the_description_names_shapes_that_are_served_as_glb(mesh):
-    async def main():
+async def test_the_description_names_shapes_that_are_served_as_glb(mesh):
+    async with kinematics_service(mesh) as session:
+        description = await last_value(session, "robomesh/hall/arm/description")
+        assert description.joints[0].name == "waist"
+        assert description.provenance.startswith("nominal")
+        assert description.provenance_zh.startswith("标称值")
+        assert [joint.title_zh for joint in description.joints][:3] == ["腰部", "肩部", "肘部"]
+        assert "<robot" in description.urdf
+        assert 'name = "pt600"' in description.robot_toml
+        for link in description.links:
+            glb = await session.ask_bytes(f"robomesh/hall/arm/mesh/{link.mesh}")
+            assert glb.startswith(b"glTF")
+        with refused(codes.MESH_UNKNOWN, name="nose"):
+            await session.ask_bytes("robomesh/hall/arm/mesh/nose")
+
+
+async def test_frames_keep_their_rate_and_a_last_value_publishes_none(mesh):
+    async with open_session(mesh) as gateway:
+        joints = gateway.declare_publisher("hall", "arm", "joints")
+        joints.put(states_of([0.5, 0.0, 0.0, 0.0, 0.0]))
         async with kinematics_service(mesh) as session:
-            description = await last_value(session, "robomesh/hall/arm/description")
-            assert description.joints[0].name == "waist"
-            assert description.provenance.startswith("nominal")
-            assert description.provenance_zh.startswith("标称值")
-            assert [joint.title_zh for joint in description.joints][:3] == ["腰部", "肩部", "肘部"]
-            assert "<robot" in description.urdf
-            assert 'name = "pt600"' in description.robot_toml
-            for link in description.links:
-                glb = await session.ask_bytes(f"robomesh/hall/arm/mesh/{link.mesh}")
-                assert glb.startswith(b"glTF")
-            with refused(codes.MESH_UNKNOWN, name="nose"):
-                await session.ask_bytes("robomesh/hall/arm/mesh/nose")
-
-    run(main())
-
-
-def test_frames_keep_their_rate_and_a_last_value_publishes_none(mesh):
-    async def main():
-        async with open_session(mesh) as gateway:
-            joints = gateway.declare_publisher("hall", "arm", "joints")
-            joints.put(states_of([0.5, 0.0, 0.0, 0.0, 0.0]))
-            async with kinematics_service(mesh) as session:
-                # The service joined after the controller's last message.
-                frames = session.subscribe("robomesh/hall/arm/frames", newest=1000)
-                old = await anext(frames)
-                assert not old.live
-                for number in range(100):
-                    joints.put(states_of([number / 100, 0.0, 0.0, 0.0, 0.0]))
-                    await asyncio.sleep(0.01)
-                live = [await anext(frames)]
-                while live[-1].header.sequence < 40:
-                    live.append(await anext(frames))
-                assert all(sample.live for sample in live)
-                spread_s = (live[-1].header.source_time_ns - live[0].header.source_time_ns) * 1e-9
-                assert len(live) / spread_s < 66
-
-    run(main())
-
-
-def test_joint_states_that_do_not_match_the_description_publish_no_frames(mesh):
-    async def main():
-        async with open_session(mesh) as gateway, kinematics_service(mesh) as session:
-            joints = gateway.declare_publisher("hall", "arm", "joints")
-            frames = session.subscribe("robomesh/hall/arm/frames", newest=10)
-            while not joints.watched:
+            # The service joined after the controller's last message.
+            frames = session.subscribe("robomesh/hall/arm/frames", newest=1000)
+            old = await anext(frames)
+            assert not old.live
+            for number in range(100):
+                joints.put(states_of([number / 100, 0.0, 0.0, 0.0, 0.0]))
                 await asyncio.sleep(0.01)
-            wrong = states_of([1.0] * 5)
-            wrong.joints[2].name = "nose"
-            joints.put(wrong)
-            joints.put(states_of([float("nan"), 0.0, 0.0, 0.0, 0.0]))
-            await asyncio.sleep(0.02)
-            joints.put(states_of([0.25, 0.0, 0.0, 0.0, 0.0]))
-            sample = await anext(frames)
-            assert sample.header.sequence == 1
-            with refused(codes.JOINT_COUNT_OF_FIELD, count="1", joints="5"):
-                await session.ask(
-                    "robomesh/hall/arm/kinematics/forward", schema.ForwardRequest(joint_positions=[1.0])
-                )
-            with pytest.raises(NoAnswerError):
-                await session.ask(
-                    "robomesh/hall/other/kinematics/forward", schema.ForwardRequest(), timeout_s=0.2
-                )
+            live = [await anext(frames)]
+            while live[-1].header.sequence < 40:
+                live.append(await anext(frames))
+            assert all(sample.live for sample in live)
+            spread_s = (live[-1].header.source_time_ns - live[0].header.source_time_ns) * 1e-9
+            assert len(live) / spread_s < 66
 
-    run(main())
+
+async def test_joint_states_that_do_not_match_the_description_publish_no_frames(mesh):
+    async with open_session(mesh) as gateway, kinematics_service(mesh) as session:
+        joints = gateway.declare_publisher("hall", "arm", "joints")
+        frames = session.subscribe("robomesh/hall/arm/frames", newest=10)
+        while not joints.watched:
+            await asyncio.sleep(0.01)
+        wrong = states_of([1.0] * 5)
+        wrong.joints[2].name = "nose"
+        joints.put(wrong)
+        joints.put(states_of([float("nan"), 0.0, 0.0, 0.0, 0.0]))
+        await asyncio.sleep(0.02)
+        joints.put(states_of([0.25, 0.0, 0.0, 0.0, 0.0]))
+        sample = await anext(frames)
+        assert sample.header.sequence == 1
+        with refused(codes.JOINT_COUNT_OF_FIELD, count="1", joints="5"):
+            await session.ask(
+                "robomesh/hall/arm/kinematics/forward", schema.ForwardRequest(joint_positions=[1.0])
+            )
+        with pytest.raises(NoAnswerError):
+            await session.ask(
+                "robomesh/hall/other/kinematics/forward", schema.ForwardRequest(), timeout_s=0.2
+            )

@@ -94,151 +94,131 @@ async def until(session, topic, predicate):
     raise AssertionError("the subscription ended")
 
 
-def test_the_description_lists_the_cells_fixtures_and_their_shapes_are_served(mesh):
-    async def main():
-        async with cell_service(mesh) as (_, monitor):
-            for robot in ("left", "right"):
-                description = await last_value(monitor, f"robomesh/hall/{robot}/description")
-                (fixture,) = description.fixtures
-                assert (fixture.name, fixture.color, description.cell) == ("post", "#c9a227", "a")
-                assert fixture.fixture_to_site == at(0.6, 0.0, 0.5).ravel().tolist()
-                assert (description.warning_distance, description.stop_distance) == (0.05, 0.01)
-                glb = await monitor.ask_bytes(f"robomesh/hall/{robot}/mesh/{fixture.mesh}", timeout_s=10.0)
-                assert glb.startswith(b"glTF")
-
-    run(main())
+async def test_the_description_lists_the_cells_fixtures_and_their_shapes_are_served(mesh):
+    async with cell_service(mesh) as (_, monitor):
+        for robot in ("left", "right"):
+            description = await last_value(monitor, f"robomesh/hall/{robot}/description")
+            (fixture,) = description.fixtures
+            assert (fixture.name, fixture.color, description.cell) == ("post", "#c9a227", "a")
+            assert fixture.fixture_to_site == at(0.6, 0.0, 0.5).ravel().tolist()
+            assert (description.warning_distance, description.stop_distance) == (0.05, 0.01)
+            glb = await monitor.ask_bytes(f"robomesh/hall/{robot}/mesh/{fixture.mesh}", timeout_s=10.0)
+            assert glb.startswith(b"glTF")
 
 
-def test_clearance_counts_the_other_robot_only_while_it_reports_its_position(mesh):
+async def test_clearance_counts_the_other_robot_only_while_it_reports_its_position(mesh):
     left = np.radians([-57.0, 90.0, -67.0, 0.0, 0.0])
     right = np.radians([69.0, 79.0, -73.0, 0.0, 0.0])
 
-    async def main():
-        async with (
-            cell_service(mesh) as (gateway, monitor),
-            publishing(gateway, {"left": left, "right": right}) as poses,
-        ):
-            state = await until(
-                monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted
-            )
-            expected = outside_clearance(BUILT, "left", left, {"right": right})
-            assert expected.pair[1].startswith("right/")
-            assert state.clearance.distance == pytest.approx(expected.distance_m, abs=1e-9)
-            assert (state.clearance.first, state.clearance.second) == tuple(
-                f"hall/{name}" for name in expected.pair
-            )
-            points = [(p.x, p.y, p.z) for p in (state.clearance.first_point, state.clearance.second_point)]
-            assert np.subtract(*points) @ np.subtract(*points) == pytest.approx(expected.distance_m**2)
-            nearest = own_nearest(BUILT, "left", left)
-            # GJK's result depends on the pose measured before, within its tolerance.
-            assert state.own_clearance.distance == pytest.approx(nearest.distance_m, abs=1e-6)
-            del poses["right"]
-            state = await until(monitor, "kinematics", lambda m: m.not_counted)
-            assert list(state.not_counted) == ["right"]
-            assert state.clearance.second == "hall/post"
-            event = await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.not_counted")
-            assert event.values["robot"] == "right"
-            poses["right"] = right
-            await until(monitor, "kinematics", lambda m: not m.not_counted)
-
-    run(main())
+    async with (
+        cell_service(mesh) as (gateway, monitor),
+        publishing(gateway, {"left": left, "right": right}) as poses,
+    ):
+        state = await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
+        expected = outside_clearance(BUILT, "left", left, {"right": right})
+        assert expected.pair[1].startswith("right/")
+        assert state.clearance.distance == pytest.approx(expected.distance_m, abs=1e-9)
+        assert (state.clearance.first, state.clearance.second) == tuple(
+            f"hall/{name}" for name in expected.pair
+        )
+        points = [(p.x, p.y, p.z) for p in (state.clearance.first_point, state.clearance.second_point)]
+        assert np.subtract(*points) @ np.subtract(*points) == pytest.approx(expected.distance_m**2)
+        nearest = own_nearest(BUILT, "left", left)
+        # GJK's result depends on the pose measured before, within its tolerance.
+        assert state.own_clearance.distance == pytest.approx(nearest.distance_m, abs=1e-6)
+        del poses["right"]
+        state = await until(monitor, "kinematics", lambda m: m.not_counted)
+        assert list(state.not_counted) == ["right"]
+        assert state.clearance.second == "hall/post"
+        event = await until(monitor, "events/kinematics", lambda m: m.code == "kinematics.not_counted")
+        assert event.values["robot"] == "right"
+        poses["right"] = right
+        await until(monitor, "kinematics", lambda m: not m.not_counted)
 
 
-def test_an_arm_with_unproven_joints_has_no_clearance_and_counts_for_no_other(mesh):
+async def test_an_arm_with_unproven_joints_has_no_clearance_and_counts_for_no_other(mesh):
     left, right = np.radians([[-57.0, 90.0, -67.0, 0.0, 0.0], [69.0, 79.0, -73.0, 0.0, 0.0]])
 
-    async def main():
-        async with (
-            cell_service(mesh) as (gateway, monitor),
-            publishing(gateway, {"left": left, "right": right}),
-        ):
-            await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
-            controllers = {
-                name: gateway.declare_publisher("hall", name, "controller") for name in ("left", "right")
-            }
-            controllers["right"].put(schema.ControllerState(joints_unproven=True))
-            state = await until(monitor, "kinematics", lambda m: m.not_counted)
-            assert list(state.not_counted) == ["right"]
-            controllers["left"].put(schema.ControllerState(joints_unproven=True))
-            state = await until(monitor, "kinematics", lambda m: m.joints_unproven)
-            assert not state.HasField("clearance")
-            # The pose of its tool is shown.
-            assert len(state.tool_to_base) == 16
-            assert not state.HasField("own_clearance")
-            for each in controllers.values():
-                each.put(schema.ControllerState())
-            await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
-
-    run(main())
+    async with (
+        cell_service(mesh) as (gateway, monitor),
+        publishing(gateway, {"left": left, "right": right}),
+    ):
+        await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
+        controllers = {
+            name: gateway.declare_publisher("hall", name, "controller") for name in ("left", "right")
+        }
+        controllers["right"].put(schema.ControllerState(joints_unproven=True))
+        state = await until(monitor, "kinematics", lambda m: m.not_counted)
+        assert list(state.not_counted) == ["right"]
+        controllers["left"].put(schema.ControllerState(joints_unproven=True))
+        state = await until(monitor, "kinematics", lambda m: m.joints_unproven)
+        assert not state.HasField("clearance")
+        # The pose of its tool is shown.
+        assert len(state.tool_to_base) == 16
+        assert not state.HasField("own_clearance")
+        for each in controllers.values():
+            each.put(schema.ControllerState())
+        await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
 
 
-def test_the_joints_of_a_real_arm_count_only_after_its_gateway_has_said_that_they_are_proven(mesh):
-    async def main():
-        async with (
-            cell_service(mesh, simulated=False) as (gateway, monitor),
-            publishing(gateway, {"left": HOME, "right": HOME}),
-        ):
-            state = await until(monitor, "kinematics", lambda m: m.joints_unproven)
-            assert not state.HasField("clearance")
-            gateway.declare_publisher("hall", "left", "controller").put(schema.ControllerState())
-            state = await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
-            assert list(state.not_counted) == ["right"]
-            gateway.declare_publisher("hall", "right", "controller").put(schema.ControllerState())
-            await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
-
-    run(main())
+async def test_the_joints_of_a_real_arm_count_only_after_its_gateway_has_said_that_they_are_proven(mesh):
+    async with (
+        cell_service(mesh, simulated=False) as (gateway, monitor),
+        publishing(gateway, {"left": HOME, "right": HOME}),
+    ):
+        state = await until(monitor, "kinematics", lambda m: m.joints_unproven)
+        assert not state.HasField("clearance")
+        gateway.declare_publisher("hall", "left", "controller").put(schema.ControllerState())
+        state = await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
+        assert list(state.not_counted) == ["right"]
+        gateway.declare_publisher("hall", "right", "controller").put(schema.ControllerState())
+        await until(monitor, "kinematics", lambda m: m.HasField("clearance") and not m.not_counted)
 
 
-def test_late_joiners_receive_the_events_of_an_arm_near_a_post(mesh):
-    async def main():
-        near = np.radians([-36.87, 15.0, -30.0, 0.0, 0.0])
-        assert 0 < outside_clearance(BUILT, "left", near, {}).distance_m < 0.01
-        async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}) as poses:
+async def test_late_joiners_receive_the_events_of_an_arm_near_a_post(mesh):
+    near = np.radians([-36.87, 15.0, -30.0, 0.0, 0.0])
+    assert 0 < outside_clearance(BUILT, "left", near, {}).distance_m < 0.01
+    async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}) as poses:
 
-            async def kept():
-                return (await last_value(monitor, "robomesh/hall/left/events/kinematics")).events
+        async def kept():
+            return (await last_value(monitor, "robomesh/hall/left/events/kinematics")).events
 
-            async def reported(code):
-                while code not in [event.code for event in await kept()]:
-                    await asyncio.sleep(0.05)
+        async def reported(code):
+            while code not in [event.code for event in await kept()]:
+                await asyncio.sleep(0.05)
 
-            await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
-            poses["left"] = near
-            await reported("kinematics.clearance.stop")
-            poses["left"] = HOME
-            await reported("kinematics.clearance.stop.over")
-            events = await kept()
-            found = [(event.severity, event.code) for event in events if "clearance" in event.code]
-            assert found == [
-                (schema.Event.WARNING, "kinematics.clearance.warning"),
-                (schema.Event.ERROR, "kinematics.clearance.stop"),
-                (schema.Event.INFO, "kinematics.clearance.warning.over"),
-                (schema.Event.INFO, "kinematics.clearance.stop.over"),
-            ]
-            assert {event.values["second"] for event in events if "clearance" in event.code} == {"post"}
-
-    run(main())
+        await until(monitor, "kinematics", lambda m: m.HasField("clearance"))
+        poses["left"] = near
+        await reported("kinematics.clearance.stop")
+        poses["left"] = HOME
+        await reported("kinematics.clearance.stop.over")
+        events = await kept()
+        found = [(event.severity, event.code) for event in events if "clearance" in event.code]
+        assert found == [
+            (schema.Event.WARNING, "kinematics.clearance.warning"),
+            (schema.Event.ERROR, "kinematics.clearance.stop"),
+            (schema.Event.INFO, "kinematics.clearance.warning.over"),
+            (schema.Event.INFO, "kinematics.clearance.stop.over"),
+        ]
+        assert {event.values["second"] for event in events if "clearance" in event.code} == {"post"}
 
 
-def test_frames_repeat_the_fixtures_about_once_a_second(mesh):
-    async def main():
-        async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}):
-            fixture_times_ns, between = [], 0
-            async for sample in monitor.subscribe("robomesh/hall/left/frames", newest=100):
-                frames = {each.child_frame_id: each for each in sample.message().transforms}
-                assert "hall/left/tool" in frames
-                if "hall/post" in frames:
-                    fixture_times_ns.append(sample.header.source_time_ns)
-                else:
-                    between += bool(fixture_times_ns)
-                if len(fixture_times_ns) == 2:
-                    break
-            assert frames["hall/post"].parent_frame_id == "hall"
-            assert frames["hall/post"].translation.x == pytest.approx(0.6)
-            assert between
-            assert fixture_times_ns[1] - fixture_times_ns[0] > 0.8e9
-
-    run(main())
+async def test_frames_repeat_the_fixtures_about_once_a_second(mesh):
+    async with cell_service(mesh) as (gateway, monitor), publishing(gateway, {"left": HOME}):
+        fixture_times_ns, between = [], 0
+        async for sample in monitor.subscribe("robomesh/hall/left/frames", newest=100):
+            frames = {each.child_frame_id: each for each in sample.message().transforms}
+            assert "hall/left/tool" in frames
+            if "hall/post" in frames:
+                fixture_times_ns.append(sample.header.source_time_ns)
+            else:
+                between += bool(fixture_times_ns)
+            if len(fixture_times_ns) == 2:
+                break
+        assert frames["hall/post"].parent_frame_id == "hall"
+        assert frames["hall/post"].translation.x == pytest.approx(0.6)
+        assert between
+        assert fixture_times_ns[1] - fixture_times_ns[0] > 0.8e9
 
 
 def test_inverse_and_check_run_in_processes_that_end_with_the_service(mesh, monkeypatch):

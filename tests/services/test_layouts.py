@@ -12,7 +12,6 @@ from services.console.accounts.file import AccountRole
 from services.console.accounts.rights import check_right, parse_request
 from services.store import layouts as layouts_module
 from services.store.layouts import LONGEST_TEXT, MOST_LAYOUTS, Layouts
-from tests.conftest import run
 from tests.refusals import refused
 from tests.services.test_notes import signed_in
 from tests.services.test_store import stored
@@ -111,24 +110,21 @@ def test_a_full_disk_changes_nothing(tmp_path, monkeypatch):
     assert names(layouts) == ["there"]
 
 
-def test_a_saved_layout_is_on_every_page_at_once(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path, quotas=Quotas(program_saves_a_minute=2)) as page:
-            lists = page.subscribe("robomesh/s/-/layouts", newest=100)
-            assert not (await anext(lists)).message().layouts
-            key, request = "robomesh/s/-/layouts/request/li.s", Request(action=Request.SAVE, name="night")
-            answer = await page.ask(key, request, timeout_s=20.0)
-            async with asyncio.timeout(20.0):
-                # A list that is published during the query arrives twice.
-                while (message := (await anext(lists)).message()) != answer:
-                    assert not message.layouts
-            assert answer.layouts[0].author == "li.s"
-            request.action = Request.DELETE
+async def test_a_saved_layout_is_on_every_page_at_once(mesh, tmp_path):
+    async with stored(mesh, tmp_path, quotas=Quotas(program_saves_a_minute=2)) as page:
+        lists = page.subscribe("robomesh/s/-/layouts", newest=100)
+        assert not (await anext(lists)).message().layouts
+        key, request = "robomesh/s/-/layouts/request/li.s", Request(action=Request.SAVE, name="night")
+        answer = await page.ask(key, request, timeout_s=20.0)
+        async with asyncio.timeout(20.0):
+            # A list that is published during the query arrives twice.
+            while (message := (await anext(lists)).message()) != answer:
+                assert not message.layouts
+        assert answer.layouts[0].author == "li.s"
+        request.action = Request.DELETE
+        await page.ask(key, request, timeout_s=20.0)
+        with refused(codes.OVER_QUOTA, quota="program_saves_a_minute"):
             await page.ask(key, request, timeout_s=20.0)
-            with refused(codes.OVER_QUOTA, quota="program_saves_a_minute"):
-                await page.ask(key, request, timeout_s=20.0)
-
-    run(main())
 
 
 def test_a_monitor_may_not_save_layouts():

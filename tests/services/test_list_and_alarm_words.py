@@ -117,16 +117,13 @@ def test_a_list_that_leaves_out_sessions_says_that_it_is_partial(mesh, capsys):
     assert "partial" not in capsys.readouterr().out
 
 
-def test_the_error_for_an_unknown_robot_names_gone_sites(mesh):
-    async def main():
-        async with open_session(mesh) as watch, open_session(mesh) as monitor:
-            watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
-            while not await lists(monitor):
-                await asyncio.sleep(0.02)
-            with pytest.raises(RobotNotFoundError, match=r"no robot 'beijing/pt500-1'.*; gone.*beijing"):
-                await discovery.find(monitor, "beijing/pt500-1")
-
-    run(main())
+async def test_the_error_for_an_unknown_robot_names_gone_sites(mesh):
+    async with open_session(mesh) as watch, open_session(mesh) as monitor:
+        watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
+        while not await lists(monitor):
+            await asyncio.sleep(0.02)
+        with pytest.raises(RobotNotFoundError, match=r"no robot 'beijing/pt500-1'.*; gone.*beijing"):
+            await discovery.find(monitor, "beijing/pt500-1")
 
 
 @pytest.mark.parametrize(

@@ -197,38 +197,32 @@ async def attached(mesh, site="s"):
         yield AsyncRobot(client.session, site, "arm")
 
 
-def test_a_note_is_published_listed_and_kept_over_a_restart(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path) as page, attached(mesh) as robot:
-            events = page.subscribe("robomesh/s/arm/events/store", newest=10, history=False)
-            begin = datetime.now(UTC) - timedelta(seconds=30)
-            note = await robot.note("gripper slips", begin, begin + timedelta(seconds=5), author="li")
-            event = (await anext(events)).message()
-            assert (event.note.id, event.note.author, event.note.text) == (note.id, "li", "gripper slips")
-            await robot.withdraw_note(note.id, author="li")
-            assert (await anext(events)).message().values["by"] == "li"
-        async with stored(mesh, tmp_path) as page, attached(mesh) as robot:
-            (kept,) = await robot.notes()
-            assert (kept.id, kept.begin, kept.withdrawn_by) == (note.id, note.begin, "li")
-            history = await page.last("robomesh/s/arm/events/store")
-            assert [each.code for each in history.events] == ["note.written", "note.withdrawn"]
-
-    run(main())
+async def test_a_note_is_published_listed_and_kept_over_a_restart(mesh, tmp_path):
+    async with stored(mesh, tmp_path) as page, attached(mesh) as robot:
+        events = page.subscribe("robomesh/s/arm/events/store", newest=10, history=False)
+        begin = datetime.now(UTC) - timedelta(seconds=30)
+        note = await robot.note("gripper slips", begin, begin + timedelta(seconds=5), author="li")
+        event = (await anext(events)).message()
+        assert (event.note.id, event.note.author, event.note.text) == (note.id, "li", "gripper slips")
+        await robot.withdraw_note(note.id, author="li")
+        assert (await anext(events)).message().values["by"] == "li"
+    async with stored(mesh, tmp_path) as page, attached(mesh) as robot:
+        (kept,) = await robot.notes()
+        assert (kept.id, kept.begin, kept.withdrawn_by) == (note.id, note.begin, "li")
+        history = await page.last("robomesh/s/arm/events/store")
+        assert [each.code for each in history.events] == ["note.written", "note.withdrawn"]
 
 
-def test_notes_have_a_quota_and_known_robots_only(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path, quotas=Quotas(notes_a_minute=2)) as page:
-            for robot, code in (("arm", None), ("other", codes.PROGRAMS_ROBOT), ("arm", codes.OVER_QUOTA)):
-                request = Request(action=Request.WRITE, robot=robot, text="x")
-                sent = page.ask("robomesh/s/-/notes/request/li", request, timeout_s=20.0)
-                if code is None:
+async def test_notes_have_a_quota_and_known_robots_only(mesh, tmp_path):
+    async with stored(mesh, tmp_path, quotas=Quotas(notes_a_minute=2)) as page:
+        for robot, code in (("arm", None), ("other", codes.PROGRAMS_ROBOT), ("arm", codes.OVER_QUOTA)):
+            request = Request(action=Request.WRITE, robot=robot, text="x")
+            sent = page.ask("robomesh/s/-/notes/request/li", request, timeout_s=20.0)
+            if code is None:
+                await sent
+            else:
+                with refused(code):
                     await sent
-                else:
-                    with refused(code):
-                        await sent
-
-    run(main())
 
 
 def test_another_reader_finds_the_note_in_a_running_recording(mesh, tmp_path):
@@ -254,33 +248,27 @@ def test_another_reader_finds_the_note_in_a_running_recording(mesh, tmp_path):
     assert 0 <= message.log_time - begin_ns < 30 * S
 
 
-def test_without_a_store_a_note_is_refused_at_once(mesh):
-    async def main():
-        async with attached(mesh) as robot:
-            with pytest.raises(NoAnswerError, match="notes/request"):
-                await robot.note("x")
-
-    run(main())
+async def test_without_a_store_a_note_is_refused_at_once(mesh):
+    async with attached(mesh) as robot:
+        with pytest.raises(NoAnswerError, match="notes/request"):
+            await robot.note("x")
 
 
-def test_the_command_writes_lists_and_withdraws_notes(mesh, tmp_path, capsys):
-    async def main():
-        async with stored(mesh, tmp_path):
-            connect = ["--connect", mesh.connect[0]]
+async def test_the_command_writes_lists_and_withdraws_notes(mesh, tmp_path, capsys):
+    async with stored(mesh, tmp_path):
+        connect = ["--connect", mesh.connect[0]]
 
-            async def command(*words):
-                status = await asyncio.to_thread(robomesh, ["note", "s/arm", *words, *connect])
-                return status, capsys.readouterr()
+        async def command(*words):
+            status = await asyncio.to_thread(robomesh, ["note", "s/arm", *words, *connect])
+            return status, capsys.readouterr()
 
-            status, out = await command("gripper slips", "--from", "2m", "--to", "1m", "--json")
-            note = json.loads(out.out)
-            assert (status, note["text"], note["end"] - note["begin"]) == (0, "gripper slips", 60.0)
-            assert (await command("x", "--to", "1m"))[0] == 2
-            assert (await command("x", "--from", "noon"))[0] == 2
-            status, out = await command("--withdraw", note["id"])
-            assert status == 0
-            status, out = await command()
-            assert f"{note['id']}  " in out.out
-            assert "(withdrawn by " in out.out
-
-    run(main())
+        status, out = await command("gripper slips", "--from", "2m", "--to", "1m", "--json")
+        note = json.loads(out.out)
+        assert (status, note["text"], note["end"] - note["begin"]) == (0, "gripper slips", 60.0)
+        assert (await command("x", "--to", "1m"))[0] == 2
+        assert (await command("x", "--from", "noon"))[0] == 2
+        status, out = await command("--withdraw", note["id"])
+        assert status == 0
+        status, out = await command()
+        assert f"{note['id']}  " in out.out
+        assert "(withdrawn by " in out.out

@@ -16,7 +16,6 @@ from services.console.websocket import shared_subscriptions, websocket_transport
 from services.console.websocket.page_connection import PageConnection
 from services.console.websocket.shared_subscriptions import SharedSubscriptions
 from services.console.websocket.websocket_transport import WebSocketTransport
-from tests.conftest import run
 from tests.services.signing_in import Client, guarded
 from tests.services.test_console import browse, console, get, page
 
@@ -71,41 +70,39 @@ async def reason_of_close(browser):
 
 
 @pytest.mark.parametrize("kind", FLOODS)
-def test_a_page_that_asks_too_much_is_disconnected_with_the_reason(mesh, page, tmp_path, monkeypatch, kind):
+async def test_a_page_that_asks_too_much_is_disconnected_with_the_reason(
+    mesh, page, tmp_path, monkeypatch, kind
+):
     monkeypatch.setattr(websocket_transport, "_PATIENCE_S", 0.2)
 
-    async def main():
-        async with two_pages(mesh, page, tmp_path) as (flooding, stops, _):
-            await write(flooding, FLOODS[kind], 100_000)
-            assert (await stops.ask(2, STOP)).ok
-            assert await reason_of_close(flooding) == (1008, "page.asks_too_much")
-            assert (await stops.ask(3, STOP)).ok
-
-    run(main())
+    async with two_pages(mesh, page, tmp_path) as (flooding, stops, _):
+        await write(flooding, FLOODS[kind], 100_000)
+        assert (await stops.ask(2, STOP)).ok
+        assert await reason_of_close(flooding) == (1008, "page.asks_too_much")
+        assert (await stops.ask(3, STOP)).ok
 
 
-def test_a_page_that_has_used_its_allowance_is_not_read_and_its_stop_is(mesh, page, tmp_path, monkeypatch):
+async def test_a_page_that_has_used_its_allowance_is_not_read_and_its_stop_is(
+    mesh, page, tmp_path, monkeypatch
+):
     monkeypatch.setattr(read_scheduler, "_PAGE_PER_S", NEVER)
     monkeypatch.setattr(read_scheduler, "_PAGE_AT_ONCE", 30.0)  # a connection takes 20
 
-    async def main():
-        async with two_pages(mesh, page, tmp_path) as (_, stops, li), li.browse() as own:
-            await own.until(lambda: own.other)
-            frames = asyncio.create_task(own.until(lambda: len(own.other) == 10_000))
-            await write(own, FLOODS["invalid"], 10_000)
-            for number in range(2, 30):
-                assert (await stops.ask(number, STOP)).ok
-            # The allowance, and what one piece overdraws.
-            assert sum(each.HasField("answer") for each in own.other) < 10 + MOST_FRAMES
-            async with li.browse() as another:  # only that page waits
-                assert not (await another.ask(1, "no/such key")).ok
-            frames.cancel()
-            own.socket.transport.abort()  # its close frame is not read either
-
-    run(main())
+    async with two_pages(mesh, page, tmp_path) as (_, stops, li), li.browse() as own:
+        await own.until(lambda: own.other)
+        frames = asyncio.create_task(own.until(lambda: len(own.other) == 10_000))
+        await write(own, FLOODS["invalid"], 10_000)
+        for number in range(2, 30):
+            assert (await stops.ask(number, STOP)).ok
+        # The allowance, and what one piece overdraws.
+        assert sum(each.HasField("answer") for each in own.other) < 10 + MOST_FRAMES
+        async with li.browse() as another:  # only that page waits
+            assert not (await another.ask(1, "no/such key")).ok
+        frames.cancel()
+        own.socket.transport.abort()  # its close frame is not read either
 
 
-def test_the_pages_of_an_account_share_an_allowance_and_no_other_account_waits(
+async def test_the_pages_of_an_account_share_an_allowance_and_no_other_account_waits(
     mesh, page, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(read_scheduler, "_ACCOUNT_PER_S", NEVER)
@@ -118,25 +115,22 @@ def test_the_pages_of_an_account_share_an_allowance_and_no_other_account_waits(
 
     monkeypatch.setattr(PageConnection, "_ask", noted)
 
-    async def main():
-        async with two_pages(mesh, page, tmp_path) as (first, stops, li):
-            zhao = Client(li.address)
-            await zhao.sign_in("zhao")
-            async with zhao.browse() as second, zhao.browse("/mesh/stop") as own_stops, li.browse() as other:
-                await write(first, FLOODS["empty"], 100)
-                assert (await own_stops.ask(0, STOP)).ok  # the frames before it were read
-                await second.send(ask={"id": 1, "key": "no/such key"})
-                assert not (await other.ask(1, "no/such key")).ok
-                assert (await own_stops.ask(1, STOP)).ok
-                assert (await stops.ask(2, STOP)).ok
-                assert [name for name, key in asked if key != STOP] == ["li.s"]
-                for each in (first, second):
-                    each.socket.transport.abort()  # their close frames are not read either
-
-    run(main())
+    async with two_pages(mesh, page, tmp_path) as (first, stops, li):
+        zhao = Client(li.address)
+        await zhao.sign_in("zhao")
+        async with zhao.browse() as second, zhao.browse("/mesh/stop") as own_stops, li.browse() as other:
+            await write(first, FLOODS["empty"], 100)
+            assert (await own_stops.ask(0, STOP)).ok  # the frames before it were read
+            await second.send(ask={"id": 1, "key": "no/such key"})
+            assert not (await other.ask(1, "no/such key")).ok
+            assert (await own_stops.ask(1, STOP)).ok
+            assert (await stops.ask(2, STOP)).ok
+            assert [name for name, key in asked if key != STOP] == ["li.s"]
+            for each in (first, second):
+                each.socket.transport.abort()  # their close frames are not read either
 
 
-def test_a_turn_of_the_event_loop_reads_a_bounded_number_of_frames(mesh, page, monkeypatch):
+async def test_a_turn_of_the_event_loop_reads_a_bounded_number_of_frames(mesh, page, monkeypatch):
     turns = {}
 
     class Counted(WebSocketTransport):
@@ -153,33 +147,27 @@ def test_a_turn_of_the_event_loop_reads_a_bounded_number_of_frames(mesh, page, m
             now += 1
             await asyncio.sleep(0)
 
-    async def main():
-        async with console(mesh, page) as (address, _), browse(address) as one, browse(address) as two:
-            counting = asyncio.create_task(count())
-            for each in (one, two):
-                await write(each, FLOODS["pings"], 400)
-            async with asyncio.timeout(30.0):
-                while sum(turns.values()) < 800:
-                    await asyncio.sleep(0)
-            counting.cancel()
-            assert max(turns.values()) <= MOST_FRAMES
-
-    run(main())
+    async with console(mesh, page) as (address, _), browse(address) as one, browse(address) as two:
+        counting = asyncio.create_task(count())
+        for each in (one, two):
+            await write(each, FLOODS["pings"], 400)
+        async with asyncio.timeout(30.0):
+            while sum(turns.values()) < 800:
+                await asyncio.sleep(0)
+        counting.cancel()
+        assert max(turns.values()) <= MOST_FRAMES
 
 
-def test_a_connection_for_stops_takes_nothing_else_and_ends_with_its_session(mesh, page, tmp_path):
-    async def main():
-        async with two_pages(mesh, page, tmp_path) as (_, stops, li):
-            async with li.browse("/mesh/stop") as watching:
-                await watching.watch(KEY)
-                assert await reason_of_close(watching) == (1008, "page.stops_only")
-            await li.post("/account/sign-out")
-            assert (await reason_of_close(stops))[0] == 4401
-
-    run(main())
+async def test_a_connection_for_stops_takes_nothing_else_and_ends_with_its_session(mesh, page, tmp_path):
+    async with two_pages(mesh, page, tmp_path) as (_, stops, li):
+        async with li.browse("/mesh/stop") as watching:
+            await watching.watch(KEY)
+            assert await reason_of_close(watching) == (1008, "page.stops_only")
+        await li.post("/account/sign-out")
+        assert (await reason_of_close(stops))[0] == 4401
 
 
-def test_watching_and_unwatching_in_turn_subscribes_once_and_an_unwatched_key_ends(mesh, monkeypatch):
+async def test_watching_and_unwatching_in_turn_subscribes_once_and_an_unwatched_key_ends(mesh, monkeypatch):
     declared = []
     subscribe = Session.subscribe
 
@@ -190,46 +178,40 @@ def test_watching_and_unwatching_in_turn_subscribes_once_and_an_unwatched_key_en
     monkeypatch.setattr(Session, "subscribe", counted)
     monkeypatch.setattr(shared_subscriptions, "_LINGER_S", 0.05)
 
-    async def main():
-        async with open_session(mesh) as session:
-            shared = SharedSubscriptions(session)
-            for _ in range(1000):
-                shared.join(KEY, print)
-                shared.leave(KEY, print)
-            assert len(declared) == 1
-            async with asyncio.timeout(30.0):
-                while not declared[0].closed:
-                    await asyncio.sleep(0.01)
+    async with open_session(mesh) as session:
+        shared = SharedSubscriptions(session)
+        for _ in range(1000):
             shared.join(KEY, print)
             shared.leave(KEY, print)
-            shared.join(KEY, print)
-            assert (len(declared), KEY in shared) == (2, True)
-            while shared._ends:  # watched again in time
+        assert len(declared) == 1
+        async with asyncio.timeout(30.0):
+            while not declared[0].closed:
                 await asyncio.sleep(0.01)
-            assert not declared[1].closed
-            shared.close()
+        shared.join(KEY, print)
+        shared.leave(KEY, print)
+        shared.join(KEY, print)
+        assert (len(declared), KEY in shared) == (2, True)
+        while shared._ends:  # watched again in time
+            await asyncio.sleep(0.01)
+        assert not declared[1].closed
+        shared.close()
 
-    run(main())
 
+async def test_requests_begin_one_a_turn_and_a_page_is_read_between_them():
+    reads, order = ReadScheduler(), []
 
-def test_requests_begin_one_a_turn_and_a_page_is_read_between_them():
-    async def main():
-        reads, order = ReadScheduler(), []
+    async def request(number):
+        await reads.request_turn()
+        order.append(number)
 
-        async def request(number):
-            await reads.request_turn()
-            order.append(number)
-
-        requests = [asyncio.create_task(request(number)) for number in range(4)]
-        requests[2].cancel()
-        await asyncio.sleep(0)
-        reads.turns.add(reads.pages, lambda: order.append("page"))
-        reads.turns.add(reads.stops, lambda: order.append("stop"))
-        await asyncio.gather(*requests, return_exceptions=True)
-        assert order.index("stop") <= 2
-        assert [each for each in order if isinstance(each, int)] == [0, 1, 3]
-
-    run(main())
+    requests = [asyncio.create_task(request(number)) for number in range(4)]
+    requests[2].cancel()
+    await asyncio.sleep(0)
+    reads.turns.add(reads.pages, lambda: order.append("page"))
+    reads.turns.add(reads.stops, lambda: order.append("stop"))
+    await asyncio.gather(*requests, return_exceptions=True)
+    assert order.index("stop") <= 2
+    assert [each for each in order if isinstance(each, int)] == [0, 1, 3]
 
 
 def test_an_allowance_is_overdrawn_by_one_piece_and_then_waited_for():
@@ -244,7 +226,7 @@ def test_an_allowance_is_overdrawn_by_one_piece_and_then_waited_for():
     assert allowance.is_full(5.0)
 
 
-def test_a_hashed_file_of_the_page_is_compressed_once_for_all_requests(mesh, page, monkeypatch):
+async def test_a_hashed_file_of_the_page_is_compressed_once_for_all_requests(mesh, page, monkeypatch):
     text, packed = b"export const joints = 6;\n" * 200, []
     (page / "assets").mkdir(exist_ok=True)
     (page / "assets" / "large-1234.js").write_bytes(text)
@@ -253,18 +235,15 @@ def test_a_hashed_file_of_the_page_is_compressed_once_for_all_requests(mesh, pag
         gzip, "compress", lambda *given, **named: packed.append(1) or compress(*given, **named)
     )
 
-    async def main():
-        async with console(mesh, page) as (address, _):
-            fetches = [
-                await get(address, "/assets/large-1234.js", **{"Accept-Encoding": "gzip"}) for _ in range(3)
-            ]
-            for status, headers, body in fetches:
-                assert (status, headers["content-encoding"]) == (200, "gzip")
-                assert headers["content-type"].startswith("text/javascript")
-                assert int(headers["content-length"]) == len(body)
-                assert gzip.decompress(body) == text
-            assert len(packed) == 1
-            status, headers, body = await get(address, "/assets/large-1234.js")
-            assert (status, "content-encoding" in headers, body) == (200, False, text)
-
-    run(main())
+    async with console(mesh, page) as (address, _):
+        fetches = [
+            await get(address, "/assets/large-1234.js", **{"Accept-Encoding": "gzip"}) for _ in range(3)
+        ]
+        for status, headers, body in fetches:
+            assert (status, headers["content-encoding"]) == (200, "gzip")
+            assert headers["content-type"].startswith("text/javascript")
+            assert int(headers["content-length"]) == len(body)
+            assert gzip.decompress(body) == text
+        assert len(packed) == 1
+        status, headers, body = await get(address, "/assets/large-1234.js")
+        assert (status, "content-encoding" in headers, body) == (200, False, text)

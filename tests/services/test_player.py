@@ -217,21 +217,18 @@ def test_a_replay_at_a_hundred_times_the_speed_is_thinned_and_on_time(mesh, tmp_
     assert count < 120  # of 6000; a slow machine skips messages and is not late
 
 
-def test_a_loop_restarts_and_close_ends_the_replay(mesh, folder):
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            state = await opened(session, loop=True, position_s=3.8, speed=1.0)
-            await until_state(session, state, lambda state: state.position_s < 1.0)
-            await ask(session, state, _Ask.CLOSE)
-            async with asyncio.timeout(40):
-                while any(each.robot == state.robot for each in await session.present()):
-                    await asyncio.sleep(0.02)
-            with pytest.raises(NoAnswerError):
-                await session.ask(
-                    f"robomesh/site/{state.robot}/replay/request", _Ask(action=_Ask.PLAY), timeout_s=0.3
-                )
-
-    run(main())
+async def test_a_loop_restarts_and_close_ends_the_replay(mesh, folder):
+    async with playing_site(mesh, folder) as session:
+        state = await opened(session, loop=True, position_s=3.8, speed=1.0)
+        await until_state(session, state, lambda state: state.position_s < 1.0)
+        await ask(session, state, _Ask.CLOSE)
+        async with asyncio.timeout(40):
+            while any(each.robot == state.robot for each in await session.present()):
+                await asyncio.sleep(0.02)
+        with pytest.raises(NoAnswerError):
+            await session.ask(
+                f"robomesh/site/{state.robot}/replay/request", _Ask(action=_Ask.PLAY), timeout_s=0.3
+            )
 
 
 def test_a_replay_can_be_neither_moved_nor_recorded(mesh, folder):
@@ -258,25 +255,22 @@ def test_a_replay_can_be_neither_moved_nor_recorded(mesh, folder):
     assert refusals["recorder/request"] == codes.REPLAY_IS_RECORDED.name
 
 
-def test_a_replay_ends_with_its_clients_session(mesh, folder, monkeypatch):
+async def test_a_replay_ends_with_its_clients_session(mesh, folder, monkeypatch):
     monkeypatch.setattr(player.player, "_SESSION_END_S", 0.1)
 
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            with refused(codes.REPLAY_SESSION, session="absent"):
-                await opened(session, session="absent")
-            token = session.declare_presence_of("site", "-", "operator", "tab")
-            state = await opened(session, session="tab", loop=True)
-            await until_state(session, state, lambda state: state.position_s > 0.1)
-            token.undeclare()
-            async with asyncio.timeout(40):
-                while any(each.robot == state.robot for each in await session.present()):
-                    await asyncio.sleep(0.02)
-
-    run(main())
+    async with playing_site(mesh, folder) as session:
+        with refused(codes.REPLAY_SESSION, session="absent"):
+            await opened(session, session="absent")
+        token = session.declare_presence_of("site", "-", "operator", "tab")
+        state = await opened(session, session="tab", loop=True)
+        await until_state(session, state, lambda state: state.position_s > 0.1)
+        token.undeclare()
+        async with asyncio.timeout(40):
+            while any(each.robot == state.robot for each in await session.present()):
+                await asyncio.sleep(0.02)
 
 
-def test_a_replay_ends_when_its_clients_session_ends_during_the_opening(mesh, folder, monkeypatch):
+async def test_a_replay_ends_when_its_clients_session_ends_during_the_opening(mesh, folder, monkeypatch):
     monkeypatch.setattr(player.player, "_SESSION_END_S", 0.1)
     opening, go_on, open_replay = threading.Event(), threading.Event(), player.player.open_replay
 
@@ -287,44 +281,38 @@ def test_a_replay_ends_when_its_clients_session_ends_during_the_opening(mesh, fo
 
     monkeypatch.setattr(player.player, "open_replay", open_slowly)
 
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            token = session.declare_presence_of("site", "-", "operator", "tab")
-            task = asyncio.create_task(opened(session, session="tab", loop=True))
-            async with asyncio.timeout(60):
-                while not opening.is_set():
-                    await asyncio.sleep(0.02)
-                token.undeclare()
-                await asyncio.sleep(1.0)
-                go_on.set()
-                state = await task
-                while any(each.robot == state.robot for each in await session.present()):
-                    await asyncio.sleep(0.02)
-
-    run(main(), timeout_s=90)
+    async with playing_site(mesh, folder) as session:
+        token = session.declare_presence_of("site", "-", "operator", "tab")
+        task = asyncio.create_task(opened(session, session="tab", loop=True))
+        async with asyncio.timeout(60):
+            while not opening.is_set():
+                await asyncio.sleep(0.02)
+            token.undeclare()
+            await asyncio.sleep(1.0)
+            go_on.set()
+            state = await task
+            while any(each.robot == state.robot for each in await session.present()):
+                await asyncio.sleep(0.02)
 
 
-def test_a_file_that_cannot_be_played_is_refused(mesh, folder):
+async def test_a_file_that_cannot_be_played_is_refused(mesh, folder):
     (folder / "arm" / "text.mcap").write_text("no recording")
 
     async def play(session, file, **values):
         await session.ask(OPEN, schema.PlayRequest(file=file, **values), timeout_s=10.0)
 
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            for name in ("gone.mcap", "../arm/trial.mcap"):
-                with refused(codes.RECORDING_UNKNOWN, name=name):
-                    await play(session, name)
-            with refused(codes.RECORDING_NOT_MCAP, file="text.mcap"):
-                await play(session, "text.mcap")
-            with refused(codes.REPLAY_SPEED, speed="500", least="0.1", most="100"):
-                await play(session, "trial.mcap", speed=500.0)
-            for _ in range(8):
-                await opened(session, paused=True)
-            with refused(codes.REPLAY_TOO_MANY, count="8"):
-                await play(session, "trial.mcap")
-
-    run(main())
+    async with playing_site(mesh, folder) as session:
+        for name in ("gone.mcap", "../arm/trial.mcap"):
+            with refused(codes.RECORDING_UNKNOWN, name=name):
+                await play(session, name)
+        with refused(codes.RECORDING_NOT_MCAP, file="text.mcap"):
+            await play(session, "text.mcap")
+        with refused(codes.REPLAY_SPEED, speed="500", least="0.1", most="100"):
+            await play(session, "trial.mcap", speed=500.0)
+        for _ in range(8):
+            await opened(session, paused=True)
+        with refused(codes.REPLAY_TOO_MANY, count="8"):
+            await play(session, "trial.mcap")
 
 
 def test_a_recording_of_one_moment_is_not_looped(mesh, tmp_path):

@@ -13,7 +13,7 @@ from controllers import probing
 from controllers.probing import ProbeError
 from services.command_line.doctor import probe
 from services.command_line.doctor.probe import examine, probes
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 from tests.controllers.fanuc.ftp_site import controller as fanuc_by_ftp
 from tests.controllers.fanuc.test_snpx_driver import controller as fanuc
 from tests.controllers.opcua.test_opcua_driver import controller as opcua
@@ -56,61 +56,46 @@ def examined(address):
     return asyncio.to_thread(examine, address)
 
 
-def test_the_unit_protocol_is_recognized_without_a_byte_sent():
-    async def main():
-        async with simulator(demo=True) as port:
-            found = await examined(f"tcp://127.0.0.1:{port}")
-        assert (found.protocol, found.sent) == ("unit", "nothing")
-        assert "with 5 joints" in found.text
-
-    run(main())
+async def test_the_unit_protocol_is_recognized_without_a_byte_sent():
+    async with simulator(demo=True) as port:
+        found = await examined(f"tcp://127.0.0.1:{port}")
+    assert (found.protocol, found.sent) == ("unit", "nothing")
+    assert "with 5 joints" in found.text
 
 
-def test_a_controller_of_universal_robots_is_recognized_by_its_answer(monkeypatch):
-    async def main():
-        async with universal_robots() as (rtde, primary):
-            at_ports(monkeypatch, rtde={"ports": (rtde,), "listens": (primary,)})
-            found = await examined(f"tcp://127.0.0.1:{rtde}")
-            assert (found.protocol, found.sent) == ("rtde", "the request for RTDE version 2")
-            assert "Universal Robots: RTDE, version 2" in found.text
-            found = await examined(f"tcp://127.0.0.1:{primary}")
-            assert (found.protocol, found.sent) == ("", "nothing")
-            assert "Universal Robots' primary or secondary interface" in found.text
-
-    run(main())
+async def test_a_controller_of_universal_robots_is_recognized_by_its_answer(monkeypatch):
+    async with universal_robots() as (rtde, primary):
+        at_ports(monkeypatch, rtde={"ports": (rtde,), "listens": (primary,)})
+        found = await examined(f"tcp://127.0.0.1:{rtde}")
+        assert (found.protocol, found.sent) == ("rtde", "the request for RTDE version 2")
+        assert "Universal Robots: RTDE, version 2" in found.text
+        found = await examined(f"tcp://127.0.0.1:{primary}")
+        assert (found.protocol, found.sent) == ("", "nothing")
+        assert "Universal Robots' primary or secondary interface" in found.text
 
 
-def test_a_controller_of_yaskawa_is_recognized_by_its_answer(monkeypatch):
-    async def main():
-        async with yaskawa() as port:
-            at_ports(monkeypatch, hses={"ports": (port,)})
-            found = await examined(f"udp://127.0.0.1:{port}")
-        assert found.protocol == "hses"
-        assert "a controller of Yaskawa with HSES: model" in found.text
-
-    run(main())
+async def test_a_controller_of_yaskawa_is_recognized_by_its_answer(monkeypatch):
+    async with yaskawa() as port:
+        at_ports(monkeypatch, hses={"ports": (port,)})
+        found = await examined(f"udp://127.0.0.1:{port}")
+    assert found.protocol == "hses"
+    assert "a controller of Yaskawa with HSES: model" in found.text
 
 
-def test_a_controller_of_fanuc_is_recognized_by_its_first_answer(monkeypatch):
-    async def main():
-        async with fanuc() as port:
-            at_ports(monkeypatch, snpx={"ports": (port,)})
-            found = await examined(f"tcp://127.0.0.1:{port}")
-        assert (found.protocol, found.received_bytes) == ("snpx", 56)
-        assert "56 zero bytes" in found.sent
-
-    run(main())
+async def test_a_controller_of_fanuc_is_recognized_by_its_first_answer(monkeypatch):
+    async with fanuc() as port:
+        at_ports(monkeypatch, snpx={"ports": (port,)})
+        found = await examined(f"tcp://127.0.0.1:{port}")
+    assert (found.protocol, found.received_bytes) == ("snpx", 56)
+    assert "56 zero bytes" in found.sent
 
 
-def test_a_controller_that_is_read_by_ftp_is_recognized_by_its_greeting(monkeypatch):
-    async def main():
-        async with fanuc_by_ftp() as port:
-            at_ports(monkeypatch, **{"fanuc-ftp": {"listens": (port,)}})
-            found = await examined(f"tcp://127.0.0.1:{port}")
-        assert (found.protocol, found.sent) == ("fanuc-ftp", "nothing")
-        assert "of a controller of FANUC: R-30iB FTP server ready." in found.text
-
-    run(main())
+async def test_a_controller_that_is_read_by_ftp_is_recognized_by_its_greeting(monkeypatch):
+    async with fanuc_by_ftp() as port:
+        at_ports(monkeypatch, **{"fanuc-ftp": {"listens": (port,)}})
+        found = await examined(f"tcp://127.0.0.1:{port}")
+    assert (found.protocol, found.sent) == ("fanuc-ftp", "nothing")
+    assert "of a controller of FANUC: R-30iB FTP server ready." in found.text
 
 
 @pytest.mark.parametrize(
@@ -132,16 +117,13 @@ def test_an_ftp_server_is_heard_and_nothing_is_sent(monkeypatch, greeting, proto
 
 
 @pytest.mark.slow
-def test_an_opc_ua_server_is_asked_for_its_endpoints_only():
-    async def main():
-        async with opcua() as port:
-            found = await examined(f"opc.tcp://127.0.0.1:{port}")
-        assert (found.protocol, found.sent) == ("opcua", "the request for its endpoints")
-        assert "robomesh (simulated controller); no security" in found.text
-        with pytest.raises(ProbeError, match="Connection refused"):
-            await examined(f"opc.tcp://127.0.0.1:{port}")
-
-    run(main())
+async def test_an_opc_ua_server_is_asked_for_its_endpoints_only():
+    async with opcua() as port:
+        found = await examined(f"opc.tcp://127.0.0.1:{port}")
+    assert (found.protocol, found.sent) == ("opcua", "the request for its endpoints")
+    assert "robomesh (simulated controller); no security" in found.text
+    with pytest.raises(ProbeError, match="Connection refused"):
+        await examined(f"opc.tcp://127.0.0.1:{port}")
 
 
 def test_a_port_that_sends_first_is_not_asked_for_endpoints():

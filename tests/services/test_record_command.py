@@ -65,15 +65,12 @@ def test_a_recording_of_another_client_is_ended_from_the_command_line(mesh, rout
     assert run(main()).problem == "recording trial was ended by another"
 
 
-def test_a_second_ctrl_c_does_not_end_the_program_before_the_recording():
-    async def main():
-        async with _interrupted() as pressed:
-            os.kill(os.getpid(), signal.SIGINT)
-            await pressed.wait()
-            os.kill(os.getpid(), signal.SIGINT)  # `timeout --signal INT` sends both
-            await asyncio.sleep(0.05)
-
-    run(main())
+async def test_a_second_ctrl_c_does_not_end_the_program_before_the_recording():
+    async with _interrupted() as pressed:
+        os.kill(os.getpid(), signal.SIGINT)
+        await pressed.wait()
+        os.kill(os.getpid(), signal.SIGINT)  # `timeout --signal INT` sends both
+        await asyncio.sleep(0.05)
 
 
 def test_a_recording_ended_by_another_client_is_reported(mesh, router, tmp_path, capsys):

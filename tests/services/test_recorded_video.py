@@ -94,19 +94,16 @@ def test_a_page_that_leaves_ends_the_process_and_its_files(videos, monkeypatch, 
     assert not list(videos.place.iterdir())
 
 
-def test_the_files_of_a_killed_console_are_removed_by_the_next(videos):
+async def test_the_files_of_a_killed_console_are_removed_by_the_next(videos):
     left = videos.place / "robomesh-video-killed"
     left.mkdir()
     (left / ".lock").touch()
     (left / "x.mp4").write_bytes(b"x")
 
-    async def main():
-        other = RecordedVideo(None, lambda _: "li")
-        running = other._own_folder()
-        videos.made._own_folder()
-        assert not left.exists()
-        assert running.exists()
-        await other.close()
-        await videos.made.close()
-
-    run(main())
+    other = RecordedVideo(None, lambda _: "li")
+    running = other._own_folder()
+    videos.made._own_folder()
+    assert not left.exists()
+    assert running.exists()
+    await other.close()
+    await videos.made.close()

@@ -39,23 +39,20 @@ async def next_state(session, condition):
         subscription.close()
 
 
-def test_the_recording_topic_counts_recorded_and_lost_messages_live(mesh, tmp_path):
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            joints = session.declare_publisher("site", "arm", "joints")
-            await trace_on(session, name="seen", views=["-"])
-            await until(lambda: joints.watched)
-            await put_states(joints, range(3))
-            joints._sequence += 4  # simulates a congested link that dropped four
-            await put_states(joints, range(3))
-            seen = await next_state(session, lambda now: now.open and any(row.lost for row in now.topics))
-            (row,) = [row for row in seen.topics if row.topic == JOINTS]
-            assert (seen.name, row.messages, row.lost) == ("seen", 6, 4)
-            await trace_off(session)
-            ended = await next_state(session, lambda now: not now.open and not now.HasField("indexing"))
-            assert (ended.name, ended.problem) == ("seen", "")
-
-    run(main())
+async def test_the_recording_topic_counts_recorded_and_lost_messages_live(mesh, tmp_path):
+    async with recording_site(mesh, tmp_path) as session:
+        joints = session.declare_publisher("site", "arm", "joints")
+        await trace_on(session, name="seen", views=["-"])
+        await until(lambda: joints.watched)
+        await put_states(joints, range(3))
+        joints._sequence += 4  # simulates a congested link that dropped four
+        await put_states(joints, range(3))
+        seen = await next_state(session, lambda now: now.open and any(row.lost for row in now.topics))
+        (row,) = [row for row in seen.topics if row.topic == JOINTS]
+        assert (seen.name, row.messages, row.lost) == ("seen", 6, 4)
+        await trace_off(session)
+        ended = await next_state(session, lambda now: not now.open and not now.HasField("indexing"))
+        assert (ended.name, ended.problem) == ("seen", "")
 
 
 def test_a_capture_continues_in_numbered_files_that_begin_with_a_key_frame(mesh, tmp_path):
@@ -96,35 +93,30 @@ def test_a_capture_continues_in_numbered_files_that_begin_with_a_key_frame(mesh,
         assert all(row.lost == 0 for row in describe_file(file).topics)
 
 
-def test_video_is_subscribed_only_while_it_is_recorded(mesh, tmp_path):
-    async def main():
-        async with recording_site(mesh, tmp_path, views=("front",)) as session:
-            front, top = (
-                session.declare_publisher("site", "arm", f"video/{name}") for name in ("front", "top")
-            )
-            await trace_on(session, views=["top"])
-            await until(lambda: top.watched)
-            assert not front.watched
+async def test_video_is_subscribed_only_while_it_is_recorded(mesh, tmp_path):
+    async with recording_site(mesh, tmp_path, views=("front",)) as session:
+        front, top = (session.declare_publisher("site", "arm", f"video/{name}") for name in ("front", "top"))
+        await trace_on(session, views=["top"])
+        await until(lambda: top.watched)
+        assert not front.watched
+        await trace_off(session)
+        await until(lambda: not top.watched)
+        await trace_on(session)
+        await until(lambda: front.watched)
+        await trace_off(session)
+        with pytest.raises(RefusedError) as error:
+            await trace_on(session, views=["a/b"])
+        (cause,) = error.value.reason.causes
+        assert (cause.code, cause.values["what"], cause.values["name"]) == ("key.chunk", "view", "a/b")
+        view = schema.View(name="front")
+        description = schema.Description(name="arm", views=[view])
+        session.declare_publisher("site", "arm", "description").put(description)
+        views = "front, free, close, far"
+        with refused(codes.VIEW_UNKNOWN_OF, view="side", robot="arm", views=views):
+            await trace_until_refused(session, views=["side"])
+        for view in ("free", "close", "far", "free-1920x1080"):
+            await trace_on(session, views=[view])
             await trace_off(session)
-            await until(lambda: not top.watched)
-            await trace_on(session)
-            await until(lambda: front.watched)
-            await trace_off(session)
-            with pytest.raises(RefusedError) as error:
-                await trace_on(session, views=["a/b"])
-            (cause,) = error.value.reason.causes
-            assert (cause.code, cause.values["what"], cause.values["name"]) == ("key.chunk", "view", "a/b")
-            view = schema.View(name="front")
-            description = schema.Description(name="arm", views=[view])
-            session.declare_publisher("site", "arm", "description").put(description)
-            views = "front, free, close, far"
-            with refused(codes.VIEW_UNKNOWN_OF, view="side", robot="arm", views=views):
-                await trace_until_refused(session, views=["side"])
-            for view in ("free", "close", "far", "free-1920x1080"):
-                await trace_on(session, views=[view])
-                await trace_off(session)
-
-    run(main())
 
 
 async def trace_until_refused(session, **fields):

@@ -87,86 +87,77 @@ def test_a_sink_receives_and_counts_as_lost_only_its_own_topics(mesh):
     assert lost_later == {}
 
 
-def test_a_recording_continues_after_invalid_messages(mesh, tmp_path):
-    async def main():
-        async with recording_site(mesh, tmp_path, flight=Flight(minutes=1.0)) as session:
-            joints = session.declare_publisher("site", "arm", "joints")
-            await until(lambda: joints.watched)
-            put = session.zenoh_session.put
-            # Not an event, and a source time before 1970.
-            put(EVENTS, b"\xff\xff", attachment=pack(Header(7, 1, 0)))
-            put(EVENTS, Event(code="early").SerializeToString(), attachment=pack(Header(7, 2, -1)))
-            answer = await trace_on(session, name="trial")
-            await put_states(joints, range(20))
-            while True:
-                recording = await session.ask(
-                    "robomesh/site/-/recordings/info",
-                    RecordingQuery(file=answer.file),
-                    timeout_s=WITHIN_S,
-                )
-                if any(each.topic == JOINTS and each.messages >= 20 for each in recording.topics):
-                    return
-                await asyncio.sleep(0.05)
-
-    run(main(), timeout_s=60)
-
-
-def test_a_history_with_an_invalid_time_is_skipped_and_later_events_are_taken(mesh):
-    async def main():
-        async with open_session(mesh) as service, open_session(mesh) as other:
-            event = Event(code="bad")
-            event.timestamp.nanos = 2_000_000_000
-            list_of = EventList(events=[event]).SerializeToString()
-
-            def reply(query):
-                query.reply(EVENTS, list_of, attachment=pack(Header(7, 1, 0)))
-
-            queryable = other.zenoh_session.declare_queryable(EVENTS, reply)
-            subscribed, sink = (
-                subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
-                Sink(),
+async def test_a_recording_continues_after_invalid_messages(mesh, tmp_path):
+    async with recording_site(mesh, tmp_path, flight=Flight(minutes=1.0)) as session:
+        joints = session.declare_publisher("site", "arm", "joints")
+        await until(lambda: joints.watched)
+        put = session.zenoh_session.put
+        # Not an event, and a source time before 1970.
+        put(EVENTS, b"\xff\xff", attachment=pack(Header(7, 1, 0)))
+        put(EVENTS, Event(code="early").SerializeToString(), attachment=pack(Header(7, 2, -1)))
+        answer = await trace_on(session, name="trial")
+        await put_states(joints, range(20))
+        while True:
+            recording = await session.ask(
+                "robomesh/site/-/recordings/info",
+                RecordingQuery(file=answer.file),
+                timeout_s=WITHIN_S,
             )
-            try:
-                with subscribed.lock:
-                    subscribed.robot("arm").attach(sink, frozenset({"events"}))
-                number = 1
-                while not sink.taken:
-                    number += 1
-                    other.zenoh_session.put(EVENTS, b"", attachment=pack(Header(7, number, 0)))
-                    await asyncio.sleep(0.02)
-            finally:
-                subscribed.close()
-                queryable.undeclare()
-
-    run(main(), timeout_s=60)
+            if any(each.topic == JOINTS and each.messages >= 20 for each in recording.topics):
+                return
+            await asyncio.sleep(0.05)
 
 
-def test_a_failing_sink_ends_no_other_robots_recording(mesh, caplog):
+async def test_a_history_with_an_invalid_time_is_skipped_and_later_events_are_taken(mesh):
+    async with open_session(mesh) as service, open_session(mesh) as other:
+        event = Event(code="bad")
+        event.timestamp.nanos = 2_000_000_000
+        list_of = EventList(events=[event]).SerializeToString()
+
+        def reply(query):
+            query.reply(EVENTS, list_of, attachment=pack(Header(7, 1, 0)))
+
+        queryable = other.zenoh_session.declare_queryable(EVENTS, reply)
+        subscribed, sink = (
+            subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
+            Sink(),
+        )
+        try:
+            with subscribed.lock:
+                subscribed.robot("arm").attach(sink, frozenset({"events"}))
+            number = 1
+            while not sink.taken:
+                number += 1
+                other.zenoh_session.put(EVENTS, b"", attachment=pack(Header(7, number, 0)))
+                await asyncio.sleep(0.02)
+        finally:
+            subscribed.close()
+            queryable.undeclare()
+
+
+async def test_a_failing_sink_ends_no_other_robots_recording(mesh, caplog):
     class Failing(Sink):
         def take(self, key, row, header, payload, received_ns):
             raise RuntimeError("injected error")
 
-    async def main():
-        async with open_session(mesh) as service, open_session(mesh) as other:
-            subscribed, sink = (
-                subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
-                Sink(),
-            )
-            try:
-                with subscribed.lock:
-                    subscribed.robot("bad").attach(Failing(), frozenset({"joints"}))
-                    subscribed.robot("arm").attach(sink, frozenset({"joints"}))
-                number = 0
-                while not ("injected error" in caplog.text and sink.taken and number > sink.taken[0][1] + 10):
-                    number += 1
-                    for key in ("robomesh/site/bad/joints", JOINTS):
-                        other.zenoh_session.put(key, b"", attachment=pack(Header(7, number, number)))
-                    await asyncio.sleep(0.02)
-                await until(lambda: len(sink.taken) > 5)
-            finally:
-                subscribed.close()
-
-    run(main(), timeout_s=60)
+    async with open_session(mesh) as service, open_session(mesh) as other:
+        subscribed, sink = (
+            subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored),
+            Sink(),
+        )
+        try:
+            with subscribed.lock:
+                subscribed.robot("bad").attach(Failing(), frozenset({"joints"}))
+                subscribed.robot("arm").attach(sink, frozenset({"joints"}))
+            number = 0
+            while not ("injected error" in caplog.text and sink.taken and number > sink.taken[0][1] + 10):
+                number += 1
+                for key in ("robomesh/site/bad/joints", JOINTS):
+                    other.zenoh_session.put(key, b"", attachment=pack(Header(7, number, number)))
+                await asyncio.sleep(0.02)
+            await until(lambda: len(sink.taken) > 5)
+        finally:
+            subscribed.close()
 
 
 def test_the_rings_of_a_hundred_robots_fit_into_memory():

@@ -19,7 +19,6 @@ from services.ros2.bridge import JOINT_STATES, ROBOT_DESCRIPTION, TF
 from services.ros2.service import serve
 from services.ros2.settings import Settings
 from services.ros2.wire import Topic
-from tests.conftest import run
 from tests.protocol_gateway.gateway_site import until
 
 GLB = b"glTF" + bytes(60)
@@ -110,135 +109,119 @@ def description(sha256):
     return message
 
 
-def test_ros_2_lists_the_topics_with_their_types(mesh, tools, tmp_path):
-    async def main():
-        wanted = {f"/{topic.name}": topic.kind for topic in (JOINT_STATES, TF, ROBOT_DESCRIPTION)}
-        async with bridge(mesh, tmp_path), asyncio.timeout(30):
-            while not wanted.items() <= (await tools.topics()).items():
-                await asyncio.sleep(0.05)
-        async with asyncio.timeout(30):
-            while await tools.topics():
-                await asyncio.sleep(0.05)
-
-    run(main(), timeout_s=60.0)
+async def test_ros_2_lists_the_topics_with_their_types(mesh, tools, tmp_path):
+    wanted = {f"/{topic.name}": topic.kind for topic in (JOINT_STATES, TF, ROBOT_DESCRIPTION)}
+    async with bridge(mesh, tmp_path), asyncio.timeout(30):
+        while not wanted.items() <= (await tools.topics()).items():
+            await asyncio.sleep(0.05)
+    async with asyncio.timeout(30):
+        while await tools.topics():
+            await asyncio.sleep(0.05)
 
 
-def test_joint_states_have_prefixed_names_and_the_gateways_time(mesh, tools, tmp_path):
-    async def main():
-        async with robot_session(mesh) as robot, bridge(mesh, tmp_path):
-            states = robot.declare_publisher("hall", "arm", "joints")
+async def test_joint_states_have_prefixed_names_and_the_gateways_time(mesh, tools, tmp_path):
+    async with robot_session(mesh) as robot, bridge(mesh, tmp_path):
+        states = robot.declare_publisher("hall", "arm", "joints")
+        got = await tools.echo("/joint_states", JOINT_STATES.kind)
+        await until(lambda: states.watched)
+        while not got:
+            states.put(joints(0.5))
+            await asyncio.sleep(0.05)
+        message = got[0]
+        assert list(message.name) == ["hall/arm/waist", "hall/arm/shoulder"]
+        assert list(message.position) == [0.5, -1.0]
+        assert list(message.velocity) == [0.25, -0.5]
+        assert len(message.effort) == 0
+        assert (message.header.stamp.sec, message.header.stamp.nanosec) == (1_700_000_000, 250_000_000)
+
+
+async def test_last_values_are_not_published_and_a_single_named_robot_has_plain_joint_names(
+    mesh, tools, tmp_path
+):
+    async with robot_session(mesh) as robot, robot_session(mesh, "arm-2") as other:
+        states = robot.declare_publisher("hall", "arm", "joints")
+        states.remember(joints(1.0), source_time_ns=5)  # a last value of unknown age
+        others = other.declare_publisher("hall", "arm-2", "joints")
+        async with bridge(mesh, tmp_path, robots=("hall/arm",)):
             got = await tools.echo("/joint_states", JOINT_STATES.kind)
             await until(lambda: states.watched)
+            far = joints(4.0)
+            far.timestamp.seconds = 200_000_000_000  # beyond the range of a ROS 2 stamp
             while not got:
-                states.put(joints(0.5))
+                others.put(joints(3.0))
+                states.put(far)
+                states.put(joints(2.0))
                 await asyncio.sleep(0.05)
-            message = got[0]
-            assert list(message.name) == ["hall/arm/waist", "hall/arm/shoulder"]
-            assert list(message.position) == [0.5, -1.0]
-            assert list(message.velocity) == [0.25, -0.5]
-            assert len(message.effort) == 0
-            assert (message.header.stamp.sec, message.header.stamp.nanosec) == (1_700_000_000, 250_000_000)
-
-    run(main())
+            assert {message.position[0] for message in got} == {2.0}
+            assert list(got[0].name) == ["waist", "shoulder"]
 
 
-def test_last_values_are_not_published_and_a_single_named_robot_has_plain_joint_names(mesh, tools, tmp_path):
-    async def main():
-        async with robot_session(mesh) as robot, robot_session(mesh, "arm-2") as other:
-            states = robot.declare_publisher("hall", "arm", "joints")
-            states.remember(joints(1.0), source_time_ns=5)  # a last value of unknown age
-            others = other.declare_publisher("hall", "arm-2", "joints")
-            async with bridge(mesh, tmp_path, robots=("hall/arm",)):
-                got = await tools.echo("/joint_states", JOINT_STATES.kind)
-                await until(lambda: states.watched)
-                far = joints(4.0)
-                far.timestamp.seconds = 200_000_000_000  # beyond the range of a ROS 2 stamp
-                while not got:
-                    others.put(joints(3.0))
-                    states.put(far)
-                    states.put(joints(2.0))
-                    await asyncio.sleep(0.05)
-                assert {message.position[0] for message in got} == {2.0}
-                assert list(got[0].name) == ["waist", "shoulder"]
-
-    run(main())
+async def test_frames_are_published_as_tf_in_the_sites_frame(mesh, tools, tmp_path):
+    async with robot_session(mesh) as robot, bridge(mesh, tmp_path):
+        publisher = robot.declare_publisher("hall", "arm", "frames")
+        got = await tools.echo("/tf", TF.kind)
+        frames = FrameTransforms()
+        frame = frames.transforms.add(parent_frame_id="hall", child_frame_id="hall/arm/base")
+        frame.timestamp.FromNanoseconds(7_000_000_009)
+        frame.translation.x, frame.rotation.w = 1.5, 1.0
+        await until(lambda: publisher.watched)
+        while not got:
+            publisher.put(frames)
+            await asyncio.sleep(0.05)
+        (stamped,) = got[0].transforms
+        assert (stamped.header.frame_id, stamped.child_frame_id) == ("hall", "hall/arm/base")
+        assert (stamped.header.stamp.sec, stamped.header.stamp.nanosec) == (7, 9)
+        assert (stamped.transform.translation.x, stamped.transform.rotation.w) == (1.5, 1.0)
 
 
-def test_frames_are_published_as_tf_in_the_sites_frame(mesh, tools, tmp_path):
-    async def main():
-        async with robot_session(mesh) as robot, bridge(mesh, tmp_path):
-            publisher = robot.declare_publisher("hall", "arm", "frames")
-            got = await tools.echo("/tf", TF.kind)
-            frames = FrameTransforms()
-            frame = frames.transforms.add(parent_frame_id="hall", child_frame_id="hall/arm/base")
-            frame.timestamp.FromNanoseconds(7_000_000_009)
-            frame.translation.x, frame.rotation.w = 1.5, 1.0
-            await until(lambda: publisher.watched)
-            while not got:
-                publisher.put(frames)
-                await asyncio.sleep(0.05)
-            (stamped,) = got[0].transforms
-            assert (stamped.header.frame_id, stamped.child_frame_id) == ("hall", "hall/arm/base")
-            assert (stamped.header.stamp.sec, stamped.header.stamp.nanosec) == (7, 9)
-            assert (stamped.transform.translation.x, stamped.transform.rotation.w) == (1.5, 1.0)
+async def test_late_subscribers_get_the_description_of_all_robots_with_shape_files(mesh, tools, tmp_path):
 
-    run(main())
-
-
-def test_late_subscribers_get_the_description_of_all_robots_with_shape_files(mesh, tools, tmp_path):
-
-    async def main():
-        sha256 = hashlib.sha256(GLB).hexdigest()
-        async with (
-            robot_session(mesh) as robot,
-            robot_session(mesh, "arm-2") as other,
-            bridge(mesh, tmp_path / "meshes"),
-        ):
-            for session, name in ((robot, "arm"), (other, "arm-2")):
-                session.declare_publisher("hall", name, "description").put(description(sha256))
-            texts, got = set(), []
-            async with asyncio.timeout(30):
-                while not any("hall/arm-2/base" in text and "hall/arm/base" in text for text in texts):
-                    got = await tools.echo("/robot_description", ROBOT_DESCRIPTION.kind, LATCHED)
-                    texts |= {message.data for message in got}
-            urdf = max(texts, key=len)
-            assert 'joint name="hall/arm/waist"' in urdf
-            file = tmp_path / "meshes" / f"{sha256}.glb"
-            assert urdf.count(file.as_uri()) == 2
-            assert file.read_bytes() == GLB
-            assert "evil" not in urdf
-            assert [each.name for each in (tmp_path / "meshes").iterdir()] == [file.name]
-
-    run(main())
+    sha256 = hashlib.sha256(GLB).hexdigest()
+    async with (
+        robot_session(mesh) as robot,
+        robot_session(mesh, "arm-2") as other,
+        bridge(mesh, tmp_path / "meshes"),
+    ):
+        for session, name in ((robot, "arm"), (other, "arm-2")):
+            session.declare_publisher("hall", name, "description").put(description(sha256))
+        texts, got = set(), []
+        async with asyncio.timeout(30):
+            while not any("hall/arm-2/base" in text and "hall/arm/base" in text for text in texts):
+                got = await tools.echo("/robot_description", ROBOT_DESCRIPTION.kind, LATCHED)
+                texts |= {message.data for message in got}
+        urdf = max(texts, key=len)
+        assert 'joint name="hall/arm/waist"' in urdf
+        file = tmp_path / "meshes" / f"{sha256}.glb"
+        assert urdf.count(file.as_uri()) == 2
+        assert file.read_bytes() == GLB
+        assert "evil" not in urdf
+        assert [each.name for each in (tmp_path / "meshes").iterdir()] == [file.name]
 
 
-def test_rmw_zenohs_subscription_gets_the_description_early_and_late(mesh, tmp_path):
-    async def main():
-        key, texts = ROBOT_DESCRIPTION.key(0), []
+async def test_rmw_zenohs_subscription_gets_the_description_early_and_late(mesh, tmp_path):
+    key, texts = ROBOT_DESCRIPTION.key(0), []
 
-        def subscribed(session):
-            """Subscribe as rmw_zenoh does for reliable and transient local."""
-            return zenoh.ext.declare_advanced_subscriber(
-                session,
-                key,
-                lambda sample: texts.append(sample.payload.to_bytes()),
-                history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
-                recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
-                subscriber_detection=True,
-            )
+    def subscribed(session):
+        """Subscribe as rmw_zenoh does for reliable and transient local."""
+        return zenoh.ext.declare_advanced_subscriber(
+            session,
+            key,
+            lambda sample: texts.append(sample.payload.to_bytes()),
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+            subscriber_detection=True,
+        )
 
-        async with robot_session(mesh) as robot, open_session(mesh) as early, open_session(mesh) as late:
-            robot.declare_publisher("hall", "arm", "description").put(description(""))
-            before = subscribed(early.zenoh_session)
-            async with bridge(mesh, tmp_path):
-                await until(lambda: any(b"hall/arm/base" in text for text in texts))
-                texts.clear()
-                after = subscribed(late.zenoh_session)
-                await until(lambda: any(b"hall/arm/base" in text for text in texts))
-            before.undeclare()
-            after.undeclare()
-
-    run(main())
+    async with robot_session(mesh) as robot, open_session(mesh) as early, open_session(mesh) as late:
+        robot.declare_publisher("hall", "arm", "description").put(description(""))
+        before = subscribed(early.zenoh_session)
+        async with bridge(mesh, tmp_path):
+            await until(lambda: any(b"hall/arm/base" in text for text in texts))
+            texts.clear()
+            after = subscribed(late.zenoh_session)
+            await until(lambda: any(b"hall/arm/base" in text for text in texts))
+        before.undeclare()
+        after.undeclare()
 
 
 @pytest.mark.parametrize(
@@ -255,40 +238,35 @@ def test_types_have_the_hashes_that_ros_2_prints(topic, hashed):
     assert topic.type_hash == f"RIHS01_{hashed}"
 
 
-def test_keys_tokens_and_attachments_are_rmw_zenohs(mesh, tmp_path):
+async def test_keys_tokens_and_attachments_are_rmw_zenohs(mesh, tmp_path):
     """Compare with its sources and with other clients."""
 
-    async def main():
-        async with robot_session(mesh) as robot, open_session(mesh) as ros:
-            taken, tokens = [], []
-            found = ros.zenoh_session.declare_subscriber("7/joint_states/**", taken.append)
-            alive = ros.zenoh_session.liveliness().declare_subscriber(
-                "@ros2_lv/7/**", lambda token: tokens.append(str(token.key_expr)), history=True
-            )
-            async with bridge(mesh, tmp_path, domain=7, node="bridge"):
-                states = robot.declare_publisher("hall", "arm", "joints")
-                await until(lambda: states.watched)
-                while len(taken) < 2:
-                    states.put(joints(0.5), source_time_ns=99)
-                    await asyncio.sleep(0.05)
-                await until(lambda: len(tokens) >= 5)
-            found.undeclare()
-            alive.undeclare()
-            first, second = (
-                zenoh.ext.z_deserialize(tuple[zenoh.ext.Int64, zenoh.ext.Int64, bytes], each.attachment)
-                for each in taken[:2]
-            )
-            assert (second[0] - first[0], first[1], len(first[2])) == (1, 99, 16)
-            assert first[2] == second[2]
-            assert taken[0].payload.to_bytes()[:4] == b"\0\1\0\0"
-            assert ROBOT_DESCRIPTION.key(7).startswith(
-                "7/robot_description/std_msgs::msg::dds_::String_/RIHS01_"
-            )
-            node = next(token for token in tokens if "/NN/" in token)
-            assert node.endswith("/0/0/NN/%/%/bridge")
-            publisher = next(token for token in tokens if "%robot_description" in token)
-            assert "/MP/%/%/bridge/%robot_description/std_msgs::msg::dds_::String_/RIHS01_" in publisher
-            assert publisher.endswith("/:1:,1:,:,:,,")
-            assert any("%tf/" in token and token.endswith("/::,100:,:,:,,") for token in tokens)
-
-    run(main())
+    async with robot_session(mesh) as robot, open_session(mesh) as ros:
+        taken, tokens = [], []
+        found = ros.zenoh_session.declare_subscriber("7/joint_states/**", taken.append)
+        alive = ros.zenoh_session.liveliness().declare_subscriber(
+            "@ros2_lv/7/**", lambda token: tokens.append(str(token.key_expr)), history=True
+        )
+        async with bridge(mesh, tmp_path, domain=7, node="bridge"):
+            states = robot.declare_publisher("hall", "arm", "joints")
+            await until(lambda: states.watched)
+            while len(taken) < 2:
+                states.put(joints(0.5), source_time_ns=99)
+                await asyncio.sleep(0.05)
+            await until(lambda: len(tokens) >= 5)
+        found.undeclare()
+        alive.undeclare()
+        first, second = (
+            zenoh.ext.z_deserialize(tuple[zenoh.ext.Int64, zenoh.ext.Int64, bytes], each.attachment)
+            for each in taken[:2]
+        )
+        assert (second[0] - first[0], first[1], len(first[2])) == (1, 99, 16)
+        assert first[2] == second[2]
+        assert taken[0].payload.to_bytes()[:4] == b"\0\1\0\0"
+        assert ROBOT_DESCRIPTION.key(7).startswith("7/robot_description/std_msgs::msg::dds_::String_/RIHS01_")
+        node = next(token for token in tokens if "/NN/" in token)
+        assert node.endswith("/0/0/NN/%/%/bridge")
+        publisher = next(token for token in tokens if "%robot_description" in token)
+        assert "/MP/%/%/bridge/%robot_description/std_msgs::msg::dds_::String_/RIHS01_" in publisher
+        assert publisher.endswith("/:1:,1:,:,:,,")
+        assert any("%tf/" in token and token.endswith("/::,100:,:,:,,") for token in tokens)

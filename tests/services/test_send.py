@@ -79,69 +79,58 @@ def sent(li):
     return asyncio.create_task(run)
 
 
-def test_a_busy_renewal_is_repeated_and_a_refused_one_ends_control(mesh):
-    async def main():
-        async with open_session(mesh) as session, open_session(mesh) as li, open_session(mesh) as eve:
-            gateway = Gateway(session, RUNNING)
-            gateway.ready.set()
-            publishing = asyncio.create_task(gateway.publish_states())
-            outcome = sent(li)
-            await until(lambda: gateway.asked and gateway.renewed)
-            asks, asked = schema.LeaseRequest(action=A.ASK).SerializeToString(), []
-            async with asyncio.timeout(40):
-                while gateway.waiting < 16:
-                    one = ask_all(eve.zenoh_session, parse_key(KEY), asks, timeout_s=20.0)
-                    asked.append(asyncio.create_task(one))
-                    await asyncio.sleep(0.01)
-            before = gateway.renewed
-            # Two renewals, each repeated for half a second.
-            await asyncio.wait((outcome,), timeout=2.2)
-            assert gateway.renewed == before
-            assert not outcome.done()
-            gateway.end.set()
-            await until(lambda: gateway.renewed > before)
-            gateway.taken = True
-            assert await outcome == (False, "control ended before the motion did: eve has control", "")
-            assert gateway.stops == []
-            await asyncio.gather(*asked)
-            publishing.cancel()
-
-    run(main())
+async def test_a_busy_renewal_is_repeated_and_a_refused_one_ends_control(mesh):
+    async with open_session(mesh) as session, open_session(mesh) as li, open_session(mesh) as eve:
+        gateway = Gateway(session, RUNNING)
+        gateway.ready.set()
+        publishing = asyncio.create_task(gateway.publish_states())
+        outcome = sent(li)
+        await until(lambda: gateway.asked and gateway.renewed)
+        asks, asked = schema.LeaseRequest(action=A.ASK).SerializeToString(), []
+        async with asyncio.timeout(40):
+            while gateway.waiting < 16:
+                one = ask_all(eve.zenoh_session, parse_key(KEY), asks, timeout_s=20.0)
+                asked.append(asyncio.create_task(one))
+                await asyncio.sleep(0.01)
+        before = gateway.renewed
+        # Two renewals, each repeated for half a second.
+        await asyncio.wait((outcome,), timeout=2.2)
+        assert gateway.renewed == before
+        assert not outcome.done()
+        gateway.end.set()
+        await until(lambda: gateway.renewed > before)
+        gateway.taken = True
+        assert await outcome == (False, "control ended before the motion did: eve has control", "")
+        assert gateway.stops == []
+        await asyncio.gather(*asked)
+        publishing.cancel()
 
 
-def test_ctrl_c_stops_a_program_during_its_check(mesh):
-    async def main():
-        async with open_session(mesh) as session, open_session(mesh) as li:
-            gateway = Gateway(session)
-            outcome = sent(li)
-            await until(lambda: gateway.asked)
-            signal.raise_signal(signal.SIGINT)
-            assert await outcome == (False, "interrupted: stop 1 is sent", "")
-            assert gateway.stops == ["Ctrl-C in robomesh send"]
-            gateway.ready.set()
-
-    run(main())
+async def test_ctrl_c_stops_a_program_during_its_check(mesh):
+    async with open_session(mesh) as session, open_session(mesh) as li:
+        gateway = Gateway(session)
+        outcome = sent(li)
+        await until(lambda: gateway.asked)
+        signal.raise_signal(signal.SIGINT)
+        assert await outcome == (False, "interrupted: stop 1 is sent", "")
+        assert gateway.stops == ["Ctrl-C in robomesh send"]
+        gateway.ready.set()
 
 
 @pytest.mark.slow
-def test_a_silent_gateway_is_reported_with_advice_and_an_unanswered_stop_in_words(mesh):
-    async def main():
-        async with open_session(mesh) as session, open_session(mesh) as li:
-            gateway = Gateway(session, stops=False)
-            gateway.ready.set()
-            accepted, text, _ = await sent(li)
-            assert not accepted
-            assert text.startswith(
-                "the gateway fell silent: the state of hall/arm is unknown. `robomesh send"
-            )
-            interrupted = sent(li)
-            await until(lambda: len(gateway.asked) == 2)
-            signal.raise_signal(signal.SIGINT)
-            accepted, text, _ = await interrupted
-            assert not accepted
-            assert text.startswith("interrupted: the stop failed: no answer to robomesh/hall/arm/stop")
-
-    run(main())
+async def test_a_silent_gateway_is_reported_with_advice_and_an_unanswered_stop_in_words(mesh):
+    async with open_session(mesh) as session, open_session(mesh) as li:
+        gateway = Gateway(session, stops=False)
+        gateway.ready.set()
+        accepted, text, _ = await sent(li)
+        assert not accepted
+        assert text.startswith("the gateway fell silent: the state of hall/arm is unknown. `robomesh send")
+        interrupted = sent(li)
+        await until(lambda: len(gateway.asked) == 2)
+        signal.raise_signal(signal.SIGINT)
+        accepted, text, _ = await interrupted
+        assert not accepted
+        assert text.startswith("interrupted: the stop failed: no answer to robomesh/hall/arm/stop")
 
 
 def test_a_gateway_restart_is_reported_with_advice_and_warnings_are_printed_first(mesh, capsys):
@@ -218,20 +207,17 @@ def test_a_recovery_needs_a_name_a_reason_and_a_look(words, options, text):
         send.send("hall/arm", words, operator="li", **options)
 
 
-def test_a_recovery_is_sent_with_its_reason(mesh):
-    async def main():
-        async with open_session(mesh) as session, open_session(mesh) as own:
-            gateway = Gateway(own, text="power_on is on the controller's socket")
-            gateway.ready.set()
-            command = send._recovery(["power_on"], "fuse\nchanged", True)
-            sent = await send.send_and_wait(session, discovery.RobotAddress("hall", "arm"), "li", command)
-            assert (sent.accepted, sent.text) == (True, "power_on is on the controller's socket")
-            (asked,) = gateway.asked
-            recover = schema.Recover(recovery=schema.Recover.POWER_ON, reason="fuse changed", looked=True)
-            assert asked.recover == recover
-            with pytest.raises(MessageError, match="no recovery 'dance': use unlock_protective_stop"):
-                await send.send_and_wait(
-                    session, discovery.RobotAddress("hall", "arm"), "li", send._recovery(["dance"], "x", True)
-                )
-
-    run(main())
+async def test_a_recovery_is_sent_with_its_reason(mesh):
+    async with open_session(mesh) as session, open_session(mesh) as own:
+        gateway = Gateway(own, text="power_on is on the controller's socket")
+        gateway.ready.set()
+        command = send._recovery(["power_on"], "fuse\nchanged", True)
+        sent = await send.send_and_wait(session, discovery.RobotAddress("hall", "arm"), "li", command)
+        assert (sent.accepted, sent.text) == (True, "power_on is on the controller's socket")
+        (asked,) = gateway.asked
+        recover = schema.Recover(recovery=schema.Recover.POWER_ON, reason="fuse changed", looked=True)
+        assert asked.recover == recover
+        with pytest.raises(MessageError, match="no recovery 'dance': use unlock_protective_stop"):
+            await send.send_and_wait(
+                session, discovery.RobotAddress("hall", "arm"), "li", send._recovery(["dance"], "x", True)
+            )

@@ -105,50 +105,47 @@ def test_python_reads_recorded_ones_with_units(recorded):
     assert found[CURRENT].values[-1] == pytest.approx(0.99)
 
 
-def test_they_are_live_in_python_the_terminal_and_prometheus(mesh, router, tmp_path):
+async def test_they_are_live_in_python_the_terminal_and_prometheus(mesh, router, tmp_path):
     async def ask(*arguments):
         return await asyncio.to_thread(robomesh, *arguments, "--connect", router)
 
-    async def main():
-        async with (
-            controller(demo=True) as (port, primary),
-            gateway(mesh, tmp_path, port, **UR, ports={"primary": primary}) as site,
-        ):
-            site.own.declare_presence("hall", "arm", "gateway")
-            async with client.connect_async(router) as found:
-                robot = await found.robot("hall/arm")
-                async with robot.signals() as states:
-                    state = await anext(aiter(states))
-            assert (state["payload.mass"], state.units["payload.mass"]) == (1.2, "kg")
-            assert state["safety.mode"] == "normal"
-            assert state["io.digital_out.0"] is False
-            with pytest.raises(KeyError, match="no signal 'x'; there are io"):
-                state["x"]
-            names = [name for name in state.values if name.endswith(".current") and name.startswith("joint.")]
-            assert len(names) == 6
-            listed = await ask("signals", "arm", "payload.", "joint.*.current")
-            lines = dict(line.split(None, 1) for line in listed.stdout.splitlines())
-            assert lines["payload.mass"] == "1.2 kg"
-            assert {name for name in lines if name.startswith("joint.")} == set(names)
-            printed = json.loads((await ask("signals", "arm", "--json")).stdout)
-            assert printed["signals"]["safety.mode"] == {"value": "normal", "unit": "", "age_s": 0.0}
-            assert printed["live"]
-            none = await ask("signals", "arm", "counter.")
-            assert (none.returncode, none.stderr.count("\n")) == (2, 1)
-            assert "has no signal 'counter.'" in none.stderr
-            registry = CollectorRegistry()
-            registry.register(SessionMetrics(site.own, {}))
-            page = generate_latest(registry).decode()
-            assert 'robomesh_signal{name="payload.mass",robot="arm",unit="kg"} 1.2' in page
-            assert 'name="safety.mode"' not in page
-            await site.units(10)
-        # Nothing is published without a controller.
-        async with gateway(mesh, tmp_path / "off", port, up=False, **UR) as site:
-            site.own.declare_presence("hall", "arm", "gateway")
-            none = await ask("signals", "arm")
-            assert "has no current signals" in none.stderr
-
-    run(main())
+    async with (
+        controller(demo=True) as (port, primary),
+        gateway(mesh, tmp_path, port, **UR, ports={"primary": primary}) as site,
+    ):
+        site.own.declare_presence("hall", "arm", "gateway")
+        async with client.connect_async(router) as found:
+            robot = await found.robot("hall/arm")
+            async with robot.signals() as states:
+                state = await anext(aiter(states))
+        assert (state["payload.mass"], state.units["payload.mass"]) == (1.2, "kg")
+        assert state["safety.mode"] == "normal"
+        assert state["io.digital_out.0"] is False
+        with pytest.raises(KeyError, match="no signal 'x'; there are io"):
+            state["x"]
+        names = [name for name in state.values if name.endswith(".current") and name.startswith("joint.")]
+        assert len(names) == 6
+        listed = await ask("signals", "arm", "payload.", "joint.*.current")
+        lines = dict(line.split(None, 1) for line in listed.stdout.splitlines())
+        assert lines["payload.mass"] == "1.2 kg"
+        assert {name for name in lines if name.startswith("joint.")} == set(names)
+        printed = json.loads((await ask("signals", "arm", "--json")).stdout)
+        assert printed["signals"]["safety.mode"] == {"value": "normal", "unit": "", "age_s": 0.0}
+        assert printed["live"]
+        none = await ask("signals", "arm", "counter.")
+        assert (none.returncode, none.stderr.count("\n")) == (2, 1)
+        assert "has no signal 'counter.'" in none.stderr
+        registry = CollectorRegistry()
+        registry.register(SessionMetrics(site.own, {}))
+        page = generate_latest(registry).decode()
+        assert 'robomesh_signal{name="payload.mass",robot="arm",unit="kg"} 1.2' in page
+        assert 'name="safety.mode"' not in page
+        await site.units(10)
+    # Nothing is published without a controller.
+    async with gateway(mesh, tmp_path / "off", port, up=False, **UR) as site:
+        site.own.declare_presence("hall", "arm", "gateway")
+        none = await ask("signals", "arm")
+        assert "has no current signals" in none.stderr
 
 
 def test_a_recorder_keeps_every_published_message(mesh, tmp_path):

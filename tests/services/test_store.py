@@ -15,7 +15,6 @@ from robomesh.wire.session import open_session
 from services.command_line.main import run as robomesh
 from services.store.history import sha256
 from services.store.service import FolderInUseError, Settings, serve
-from tests.conftest import run
 from tests.refusals import refused
 from tests.services.test_stored_programs import run_of
 
@@ -50,97 +49,81 @@ async def read(session, **values):
     )
 
 
-def test_a_saved_program_is_seen_at_once_with_its_author(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path) as page:
-            lists = page.subscribe("robomesh/s/arm/programs", newest=100)
-            events = page.subscribe("robomesh/s/arm/events/store", newest=100, history=False)
-            assert not (await anext(lists)).message().programs
-            answer = await ask(page, "li.s", Request.SAVE, name="pick", text="home\n")
-            (program,) = (await anext(lists)).message().programs
-            assert program == answer.program
-            assert program.current.author == "li.s"
-            event = (await anext(events)).message()
-            assert (event.code, event.values["id"]) == (codes.PROGRAMS_SAVED.name, program.id)
-            await ask(page, "wang.s", Request.DELETE, id=program.id, based_on=1, reason="not used")
-            event = (await anext(events)).message()
-            assert event.reason.values["reason"] == "not used"
-            assert (await anext(lists)).message().programs[0].current.change == Version.DELETED
-
-    run(main())
+async def test_a_saved_program_is_seen_at_once_with_its_author(mesh, tmp_path):
+    async with stored(mesh, tmp_path) as page:
+        lists = page.subscribe("robomesh/s/arm/programs", newest=100)
+        events = page.subscribe("robomesh/s/arm/events/store", newest=100, history=False)
+        assert not (await anext(lists)).message().programs
+        answer = await ask(page, "li.s", Request.SAVE, name="pick", text="home\n")
+        (program,) = (await anext(lists)).message().programs
+        assert program == answer.program
+        assert program.current.author == "li.s"
+        event = (await anext(events)).message()
+        assert (event.code, event.values["id"]) == (codes.PROGRAMS_SAVED.name, program.id)
+        await ask(page, "wang.s", Request.DELETE, id=program.id, based_on=1, reason="not used")
+        event = (await anext(events)).message()
+        assert event.reason.values["reason"] == "not used"
+        assert (await anext(lists)).message().programs[0].current.change == Version.DELETED
 
 
-def test_fifty_saves_of_two_people_at_the_same_time_lose_no_text(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path) as page:
-            program = (await ask(page, "li.s", Request.SAVE, name="pick", text="home\n")).program
+async def test_fifty_saves_of_two_people_at_the_same_time_lose_no_text(mesh, tmp_path):
+    async with stored(mesh, tmp_path) as page:
+        program = (await ask(page, "li.s", Request.SAVE, name="pick", text="home\n")).program
 
-            async def work(author):
-                based_on = 1
-                for number in range(25):
-                    values = {"id": program.id, "based_on": based_on, "text": f"{author} {number}\n"}
-                    answer = await ask(page, author, Request.SAVE, **values)
-                    based_on = answer.program.current.number
+        async def work(author):
+            based_on = 1
+            for number in range(25):
+                values = {"id": program.id, "based_on": based_on, "text": f"{author} {number}\n"}
+                answer = await ask(page, author, Request.SAVE, **values)
+                based_on = answer.program.current.number
 
-            await asyncio.gather(work("li.s"), work("wang.s"))
-            content = await read(page, id=program.id)
-            hashes = {each.sha256 for each in content.versions}
-            assert hashes >= {sha256(f"{author} {n}\n") for author in ("li.s", "wang.s") for n in range(25)}
-            assert {each.change for each in content.versions} <= {Version.SAVED, Version.ASIDE}
-
-    run(main())
+        await asyncio.gather(work("li.s"), work("wang.s"))
+        content = await read(page, id=program.id)
+        hashes = {each.sha256 for each in content.versions}
+        assert hashes >= {sha256(f"{author} {n}\n") for author in ("li.s", "wang.s") for n in range(25)}
+        assert {each.change for each in content.versions} <= {Version.SAVED, Version.ASIDE}
 
 
-def test_saves_have_a_quota_for_each_author(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path, quotas=Quotas(program_saves_a_minute=2)) as page:
-            for name in "ab":
-                await ask(page, "li.s", Request.SAVE, name=name)
-            with refused(codes.OVER_QUOTA, asker="li.s", quota="program_saves_a_minute"):
-                await ask(page, "li.s", Request.SAVE, name="c")
-            await ask(page, "wang.s", Request.SAVE, name="c")
-
-    run(main())
+async def test_saves_have_a_quota_for_each_author(mesh, tmp_path):
+    async with stored(mesh, tmp_path, quotas=Quotas(program_saves_a_minute=2)) as page:
+        for name in "ab":
+            await ask(page, "li.s", Request.SAVE, name=name)
+        with refused(codes.OVER_QUOTA, asker="li.s", quota="program_saves_a_minute"):
+            await ask(page, "li.s", Request.SAVE, name="c")
+        await ask(page, "wang.s", Request.SAVE, name="c")
 
 
-def test_the_text_that_a_gateway_runs_is_kept_and_a_replay_s_is_not(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path) as page:
-            for robot in ("arm", "replay-1"):
-                page.declare_publisher("s", robot, "program/source").put(run_of("wait 1\n", 5))
-            async with asyncio.timeout(30.0):
-                while not (tmp_path / "s" / "arm" / "runs.json").exists():
-                    await asyncio.sleep(0.02)
-            content = await read(page, sha256=sha256("wait 1\n"))
-            assert (content.text, content.version.change) == ("wait 1\n", Version.RUN)
-            assert not (tmp_path / "s" / "replay-1").exists()
-
-    run(main())
+async def test_the_text_that_a_gateway_runs_is_kept_and_a_replay_s_is_not(mesh, tmp_path):
+    async with stored(mesh, tmp_path) as page:
+        for robot in ("arm", "replay-1"):
+            page.declare_publisher("s", robot, "program/source").put(run_of("wait 1\n", 5))
+        async with asyncio.timeout(30.0):
+            while not (tmp_path / "s" / "arm" / "runs.json").exists():
+                await asyncio.sleep(0.02)
+        content = await read(page, sha256=sha256("wait 1\n"))
+        assert (content.text, content.version.change) == ("wait 1\n", Version.RUN)
+        assert not (tmp_path / "s" / "replay-1").exists()
 
 
-def test_a_robot_that_is_started_later_has_a_list(mesh, tmp_path):
-    async def main():
-        async with stored(mesh, tmp_path) as page:
-            page.declare_presence("s", "leg", "gateway")
-            async with asyncio.timeout(30.0):
-                while await page.last("robomesh/s/leg/programs") is None:
-                    pass
-
-    run(main())
+async def test_a_robot_that_is_started_later_has_a_list(mesh, tmp_path):
+    async with stored(mesh, tmp_path) as page:
+        page.declare_presence("s", "leg", "gateway")
+        async with asyncio.timeout(30.0):
+            while await page.last("robomesh/s/leg/programs") is None:
+                pass
 
 
-def test_a_second_store_of_one_folder_ends_with_a_sentence(mesh, tmp_path, monkeypatch):
+async def test_a_second_store_of_one_folder_ends_with_a_sentence(mesh, tmp_path, monkeypatch):
     monkeypatch.setattr("services.store.service._LOCK_WITHIN_S", 0.3)
 
-    async def main():
-        async with stored(mesh, tmp_path) as page:
-            with pytest.raises(FolderInUseError, match="another store uses this folder"):
-                await serve(page, Settings(site="s", folder=tmp_path))
-
-    run(main())
+    async with stored(mesh, tmp_path) as page:
+        with pytest.raises(FolderInUseError, match="another store uses this folder"):
+            await serve(page, Settings(site="s", folder=tmp_path))
 
 
-def test_commands_save_show_compare_restore_export_and_import(mesh, router, tmp_path, capsys, monkeypatch):
+async def test_commands_save_show_compare_restore_export_and_import(
+    mesh, router, tmp_path, capsys, monkeypatch
+):
     (tmp_path / "pick.prog").write_text("home\nwait 1\n")
     (tmp_path / "changed.txt").write_text("home\nwait 2")
     arm = "s/arm"
@@ -177,8 +160,5 @@ def test_commands_save_show_compare_restore_export_and_import(mesh, router, tmp_
         assert (tmp_path / "out" / "place.prog").read_bytes() == b"home\nwait 2"
         command("export", arm, str(tmp_path / "out"), status=2)
 
-    async def main():
-        async with stored(mesh, tmp_path / "programs"):
-            await asyncio.to_thread(commands)
-
-    run(main())
+    async with stored(mesh, tmp_path / "programs"):
+        await asyncio.to_thread(commands)

@@ -18,7 +18,7 @@ from services.router.router import Settings, check_ports_free, serve
 from services.site_file.site import Site
 from services.site_file.tables.console import Console
 from services.used_ports import check_free
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 
 
 @pytest.fixture
@@ -75,25 +75,17 @@ def test_a_free_port_is_free():
     check_free("the console", "127.0.0.1", 0, "")
 
 
-def test_a_router_serves_its_other_addresses_while_one_is_not_there_yet(monkeypatch):
+async def test_a_router_serves_its_other_addresses_while_one_is_not_there_yet(monkeypatch):
     # RFC 5737: no machine has this address.
     late, there = f"tcp/192.0.2.1:{free_port()}", f"tcp/127.0.0.1:{free_port()}"
 
-    async def main():
-        settings = Settings(site="hall", listen=(late, there), insecure=True)
-        task = asyncio.create_task(serve(settings))
-        async with open_session(
-            SessionSettings(connect=own_addresses(settings.listen), wait_s=20.0)
-        ) as session:
-            health = session.subscribe("robomesh/hall/-/health/*")
-            assert (
-                f"the router does not listen on {late} yet"
-                in (await anext(health)).message().problems[0].text
-            )
-            monkeypatch.setattr("services.router.router.is_absent", lambda _: False)  # its network is up
-            while (await anext(health)).message().problems:
-                pass
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-
-    run(main())
+    settings = Settings(site="hall", listen=(late, there), insecure=True)
+    task = asyncio.create_task(serve(settings))
+    async with open_session(SessionSettings(connect=own_addresses(settings.listen), wait_s=20.0)) as session:
+        health = session.subscribe("robomesh/hall/-/health/*")
+        assert f"the router does not listen on {late} yet" in (await anext(health)).message().problems[0].text
+        monkeypatch.setattr("services.router.router.is_absent", lambda _: False)  # its network is up
+        while (await anext(health)).message().problems:
+            pass
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)

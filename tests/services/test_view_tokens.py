@@ -26,7 +26,6 @@ from services.console.app import Hub, Settings, application
 from services.console.common.errors import AccountsError
 from services.console.define.settings import DefineSettings
 from services.site_file.site import Define, Site
-from tests.conftest import run
 from tests.services.http_refusals import read_refusal
 from tests.services.signing_in import accounts_file, guarded, hashed
 from tests.services.test_console import console, get, page
@@ -81,25 +80,22 @@ async def until_known(client, path, status=200):
             await asyncio.sleep(0.1)
 
 
-def test_a_token_opens_the_media_and_the_page_of_its_view(mesh, page, tmp_path):
-    async def main():
-        async with shown(mesh, page, tmp_path) as (client, renderer, _, path):
-            token = allow(path)
-            await until_known(client, f"/image/s/r/front.jpg?token={token}")
-            for opened in OPENED:
-                assert await opens(client, f"{opened}?token={token}") == 200, opened
-                # The page itself is public, its stream is not.
-                assert await opens(client, opened) == (200 if opened == "/view/s/r/front" else 401), opened
-                assert await opens(client, f"{opened}?token={token}", method="HEAD") == 200, opened
-            # It says itself what the token does not open.
-            assert await opens(client, f"/view/s/r/top?token={token}") == 200
-            assert await opens(client, f"/image/s/r/front.jpg?width=100&token={token}&height=80") == 200
-            assert await opens(client, f"/image/s/r/front.jpg?token={token}", Range="bytes=0-9") == 200
-            await client.sign_in("zhao")  # a session precedes a token
-            assert (await client.get("/image/s/r/front.jpg?token=whatever"))[0] == 200
-            await unwatched(renderer.images)
-
-    run(main())
+async def test_a_token_opens_the_media_and_the_page_of_its_view(mesh, page, tmp_path):
+    async with shown(mesh, page, tmp_path) as (client, renderer, _, path):
+        token = allow(path)
+        await until_known(client, f"/image/s/r/front.jpg?token={token}")
+        for opened in OPENED:
+            assert await opens(client, f"{opened}?token={token}") == 200, opened
+            # The page itself is public, its stream is not.
+            assert await opens(client, opened) == (200 if opened == "/view/s/r/front" else 401), opened
+            assert await opens(client, f"{opened}?token={token}", method="HEAD") == 200, opened
+        # It says itself what the token does not open.
+        assert await opens(client, f"/view/s/r/top?token={token}") == 200
+        assert await opens(client, f"/image/s/r/front.jpg?width=100&token={token}&height=80") == 200
+        assert await opens(client, f"/image/s/r/front.jpg?token={token}", Range="bytes=0-9") == 200
+        await client.sign_in("zhao")  # a session precedes a token
+        assert (await client.get("/image/s/r/front.jpg?token=whatever"))[0] == 200
+        await unwatched(renderer.images)
 
 
 def paths_of(routes, before=""):
@@ -116,41 +112,38 @@ def paths_of(routes, before=""):
             yield path, {"GET"} if isinstance(route, WebSocketRoute) else set(route.methods or {"GET"})
 
 
-def test_a_token_changes_nothing_on_any_other_route_of_the_app(mesh, page, tmp_path):
+async def test_a_token_changes_nothing_on_any_other_route_of_the_app(mesh, page, tmp_path):
     site = Site(site="s", define=Define(folder=tmp_path / "robots"))
     define = DefineSettings(site=site, store=tmp_path / "store")
 
-    async def main():
-        async with shown(mesh, page, tmp_path, define=define) as (client, _, other, path):
-            token = allow(path)
-            await until_known(client, f"/image/s/r/front.jpg?token={token}")
-            settings = Settings(site="s", page=page, accounts=path, define=define)
-            app = application(Hub(other, settings, exposed=False))
-            routes = list(paths_of(app._app.routes))
-            assert {"/account/accounts", "/define/save", "/mesh", "/mesh/s/r/front"} <= {p for p, _ in routes}
-            assert set(OPENED) <= {path for path, _ in routes}
-            for at, methods in routes:
-                if at in OPENED:
-                    methods = {"POST", "PUT", "DELETE"}
-                for method in methods:
-                    headers = {} if method in ("GET", "HEAD") else {"Content-Length": "0"}
-                    own = {"Origin": f"http://{client.address}", "Content-Type": "application/json"}
-                    bare = await opens(client, at, method=method, **headers, **own)
-                    asked = f"{at}?token={token}"
-                    assert await opens(client, asked, method=method, **headers, **own) == bare, at
-                    bearer = {"Authorization": f"Bearer {token}", "Cookie": f"robomesh-s={token}"}
-                    assert await opens(client, at, method=method, **headers, **own, **bearer) == bare, at
-                    if at not in OPENED and bare == 200:
-                        assert at in ("/health", "/account/me") or "index" in at, at
-            for at in ("/mesh", "/view/s/r/front", "/view/s/r/front/live", "/video/s/r/front.mp4"):
-                with pytest.raises(InvalidStatus) as refused:
-                    async with connect(
-                        f"ws://{client.address}{at}?token={token}", origin=f"http://{client.address}"
-                    ):
-                        pass
-                assert refused.value.response.status_code == 403
-
-    run(main(), timeout_s=120.0)
+    async with shown(mesh, page, tmp_path, define=define) as (client, _, other, path):
+        token = allow(path)
+        await until_known(client, f"/image/s/r/front.jpg?token={token}")
+        settings = Settings(site="s", page=page, accounts=path, define=define)
+        app = application(Hub(other, settings, exposed=False))
+        routes = list(paths_of(app._app.routes))
+        assert {"/account/accounts", "/define/save", "/mesh", "/mesh/s/r/front"} <= {p for p, _ in routes}
+        assert set(OPENED) <= {path for path, _ in routes}
+        for at, methods in routes:
+            if at in OPENED:
+                methods = {"POST", "PUT", "DELETE"}
+            for method in methods:
+                headers = {} if method in ("GET", "HEAD") else {"Content-Length": "0"}
+                own = {"Origin": f"http://{client.address}", "Content-Type": "application/json"}
+                bare = await opens(client, at, method=method, **headers, **own)
+                asked = f"{at}?token={token}"
+                assert await opens(client, asked, method=method, **headers, **own) == bare, at
+                bearer = {"Authorization": f"Bearer {token}", "Cookie": f"robomesh-s={token}"}
+                assert await opens(client, at, method=method, **headers, **own, **bearer) == bare, at
+                if at not in OPENED and bare == 200:
+                    assert at in ("/health", "/account/me") or "index" in at, at
+        for at in ("/mesh", "/view/s/r/front", "/view/s/r/front/live", "/video/s/r/front.mp4"):
+            with pytest.raises(InvalidStatus) as refused:
+                async with connect(
+                    f"ws://{client.address}{at}?token={token}", origin=f"http://{client.address}"
+                ):
+                    pass
+            assert refused.value.response.status_code == 403
 
 
 @pytest.mark.parametrize(
@@ -181,20 +174,17 @@ def test_a_token_changes_nothing_on_any_other_route_of_the_app(mesh, page, tmp_p
         ("/layout/s/r.json", 401),
     ],
 )
-def test_a_token_opens_no_other_address(mesh, page, tmp_path, path, status):
-    async def main():
-        async with shown(mesh, page, tmp_path) as (client, _, _, file):
-            token = allow(file)
-            await until_known(client, f"/image/s/r/front.jpg?token={token}")
-            for headers in (
-                {},
-                {"X-Forwarded-Host": client.address, "X-Forwarded-For": "127.0.0.1"},
-                {"X-Original-URL": "/image/s/r/front.jpg", "X-Rewrite-URL": "/image/s/r/front.jpg"},
-                {"X-HTTP-Method-Override": "GET", "Referer": f"http://{client.address}/"},
-            ):
-                assert await opens(client, f"{path}?token={token}", **headers) == status
-
-    run(main())
+async def test_a_token_opens_no_other_address(mesh, page, tmp_path, path, status):
+    async with shown(mesh, page, tmp_path) as (client, _, _, file):
+        token = allow(file)
+        await until_known(client, f"/image/s/r/front.jpg?token={token}")
+        for headers in (
+            {},
+            {"X-Forwarded-Host": client.address, "X-Forwarded-For": "127.0.0.1"},
+            {"X-Original-URL": "/image/s/r/front.jpg", "X-Rewrite-URL": "/image/s/r/front.jpg"},
+            {"X-HTTP-Method-Override": "GET", "Referer": f"http://{client.address}/"},
+        ):
+            assert await opens(client, f"{path}?token={token}", **headers) == status
 
 
 def set_clock(monkeypatch, by):
@@ -204,170 +194,152 @@ def set_clock(monkeypatch, by):
 
 @pytest.mark.parametrize("path", ["/video/s/r/front.mjpeg", "/video/s/r/front.mp4", "/view/s/r/front/live"])
 @pytest.mark.parametrize("how", ["revoked", "added again", "clock", "no file"])
-def test_what_a_token_shows_ends_with_it(mesh, page, tmp_path, monkeypatch, path, how):
-    async def main():
-        async with shown(mesh, page, tmp_path) as (client, renderer, _, file):
-            token = allow(file, lasts=timedelta(days=1))
-            other = allow(file, name="other")
-            await until_known(client, f"/image/s/r/front.jpg?token={token}")
-            head, _, (reader, writer) = await stream(client.address, f"{path}?token={token}", until_bytes=500)
-            assert " 200 " in head
-            _, _, (others, kept) = await stream(client.address, f"{path}?token={other}", until_bytes=500)
-            match how:
-                case "revoked":
-                    revoke_token(file, "wall")
-                case "added again":
-                    revoke_token(file, "wall")
-                    allow(file)
-                case "clock":
-                    set_clock(monkeypatch, timedelta(days=2))
-                case "no file":
-                    file.unlink()
-            async with asyncio.timeout(40.0):
-                while await reader.read(65536):
-                    pass
-            writer.close()
-            if how != "no file":
-                assert await others.read(1)  # it goes on
-            if how == "clock":
-                set_clock(monkeypatch, timedelta(days=-2))  # it stays expired
-            assert await opens(client, f"{path}?token={token}") == 401
-            kept.close()
-            await unwatched([*renderer.images, *renderer.videos])
-
-    run(main())
+async def test_what_a_token_shows_ends_with_it(mesh, page, tmp_path, monkeypatch, path, how):
+    async with shown(mesh, page, tmp_path) as (client, renderer, _, file):
+        token = allow(file, lasts=timedelta(days=1))
+        other = allow(file, name="other")
+        await until_known(client, f"/image/s/r/front.jpg?token={token}")
+        head, _, (reader, writer) = await stream(client.address, f"{path}?token={token}", until_bytes=500)
+        assert " 200 " in head
+        _, _, (others, kept) = await stream(client.address, f"{path}?token={other}", until_bytes=500)
+        match how:
+            case "revoked":
+                revoke_token(file, "wall")
+            case "added again":
+                revoke_token(file, "wall")
+                allow(file)
+            case "clock":
+                set_clock(monkeypatch, timedelta(days=2))
+            case "no file":
+                file.unlink()
+        async with asyncio.timeout(40.0):
+            while await reader.read(65536):
+                pass
+        writer.close()
+        if how != "no file":
+            assert await others.read(1)  # it goes on
+        if how == "clock":
+            set_clock(monkeypatch, timedelta(days=-2))  # it stays expired
+        assert await opens(client, f"{path}?token={token}") == 401
+        kept.close()
+        await unwatched([*renderer.images, *renderer.videos])
 
 
-def test_refusals_say_why_and_guesses_wait_but_known_tokens_do_not(mesh, page, tmp_path):
-    async def main():
-        async with shown(mesh, page, tmp_path) as (client, _, _, file):
-            token, old = allow(file), allow(file, name="old", lasts=timedelta(seconds=-1))
-            gone = allow(file, name="gone")
-            revoke_token(file, "gone")
-            await until_known(client, f"/image/s/r/front.jpg?token={token}")
+async def test_refusals_say_why_and_guesses_wait_but_known_tokens_do_not(mesh, page, tmp_path):
+    async with shown(mesh, page, tmp_path) as (client, _, _, file):
+        token, old = allow(file), allow(file, name="old", lasts=timedelta(seconds=-1))
+        gone = allow(file, name="gone")
+        revoke_token(file, "gone")
+        await until_known(client, f"/image/s/r/front.jpg?token={token}")
 
-            async def refusal(text, at="/image/s/r/front.jpg"):
-                status, headers, body = await client.get(f"{at}?token={text}")
-                return status, read_refusal(headers, body).code, headers.get("retry-after")
+        async def refusal(text, at="/image/s/r/front.jpg"):
+            status, headers, body = await client.get(f"{at}?token={text}")
+            return status, read_refusal(headers, body).code, headers.get("retry-after")
 
-            for _ in range(20):  # neither waits: they are known
-                assert await refusal(gone) == (401, "token.revoked", None)
-                assert await refusal(old) == (401, "token.expired", None)
-                assert await refusal(token, "/image/s/r/top.jpg") == (403, "token.other_view", None)
-            answers = []
-            for wrong in (
-                "",
-                "x",
-                token[:-1],
-                token.upper(),
-                "%00",
-                "x" * 5000,
-                *(token[i:] for i in range(1, 9)),
-            ):
-                answers.append(await refusal(wrong))
-            # Some were counted before the console had read the file.
-            assert answers[0] == (401, "token.unknown", None)
-            assert {answer[:2] for answer in answers} == {(401, "token.unknown"), (429, "account.wait")}
-            assert int(answers[-1][2]) >= 1
-            assert await opens(client, f"/image/s/r/front.jpg?token={token}") == 200
-            assert (await client.sign_in("li"))[0] == 200  # other failures do not count here
-
-    run(main())
+        for _ in range(20):  # neither waits: they are known
+            assert await refusal(gone) == (401, "token.revoked", None)
+            assert await refusal(old) == (401, "token.expired", None)
+            assert await refusal(token, "/image/s/r/top.jpg") == (403, "token.other_view", None)
+        answers = []
+        for wrong in (
+            "",
+            "x",
+            token[:-1],
+            token.upper(),
+            "%00",
+            "x" * 5000,
+            *(token[i:] for i in range(1, 9)),
+        ):
+            answers.append(await refusal(wrong))
+        # Some were counted before the console had read the file.
+        assert answers[0] == (401, "token.unknown", None)
+        assert {answer[:2] for answer in answers} == {(401, "token.unknown"), (429, "account.wait")}
+        assert int(answers[-1][2]) >= 1
+        assert await opens(client, f"/image/s/r/front.jpg?token={token}") == 200
+        assert (await client.sign_in("li"))[0] == 200  # other failures do not count here
 
 
-def test_uses_changes_and_refusals_are_events_and_no_token_is_in_an_event_or_log(
+async def test_uses_changes_and_refusals_are_events_and_no_token_is_in_an_event_or_log(
     mesh, page, tmp_path, caplog
 ):
     caplog.set_level(logging.DEBUG)
 
-    async def main():
-        async with shown(mesh, page, tmp_path) as (client, _, other, file):
-            events = other.subscribe("robomesh/s/-/events/console", newest=100)
-            token = allow(file)
-            path = f"/image/s/r/front.jpg?token={token}"
-            await until_known(client, path)
-            await client.get(f"/image/s/r/front.jpg?token={token[:-1]}")
-            await client.get(f"/recordings?token={token}")
-            await client.get(f"/image/s/r/front.jpg?token={token}&quality={token[:3]}")
-            revoke_token(file, "wall")
-            await until_known(client, path, 401)
-            published = {}
-            async with asyncio.timeout(40.0):
-                async for sample in events:
-                    message = sample.message()
-                    for event in getattr(message, "events", [message]):
-                        published[event.code] = event
-                    if {"token.added", "token.used", "token.refused", "token.revoked"} <= set(published):
-                        break
-            events.close()
-            used = published["token.used"].values
-            assert (used["token"], used["robot"], used["view"]) == ("wall", "s/r", "front")
-            assert used["address"] == "127.0.0.1"
-            said = " ".join(str(event) for event in published.values())
-            logged = " ".join(record.getMessage() for record in caplog.records if record.name != "asyncio")
-            assert token not in said
-            assert token not in logged
-            assert token not in file.read_text()
-            assert stat.S_IMODE(file.stat().st_mode) == 0o600
-
-    run(main())
+    async with shown(mesh, page, tmp_path) as (client, _, other, file):
+        events = other.subscribe("robomesh/s/-/events/console", newest=100)
+        token = allow(file)
+        path = f"/image/s/r/front.jpg?token={token}"
+        await until_known(client, path)
+        await client.get(f"/image/s/r/front.jpg?token={token[:-1]}")
+        await client.get(f"/recordings?token={token}")
+        await client.get(f"/image/s/r/front.jpg?token={token}&quality={token[:3]}")
+        revoke_token(file, "wall")
+        await until_known(client, path, 401)
+        published = {}
+        async with asyncio.timeout(40.0):
+            async for sample in events:
+                message = sample.message()
+                for event in getattr(message, "events", [message]):
+                    published[event.code] = event
+                if {"token.added", "token.used", "token.refused", "token.revoked"} <= set(published):
+                    break
+        events.close()
+        used = published["token.used"].values
+        assert (used["token"], used["robot"], used["view"]) == ("wall", "s/r", "front")
+        assert used["address"] == "127.0.0.1"
+        said = " ".join(str(event) for event in published.values())
+        logged = " ".join(record.getMessage() for record in caplog.records if record.name != "asyncio")
+        assert token not in said
+        assert token not in logged
+        assert token not in file.read_text()
+        assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
-def test_a_request_that_is_revoked_before_its_answer_is_refused():
+async def test_a_request_that_is_revoked_before_its_answer_is_refused():
     """A cancelled handler without an answer would be the server's error 500."""
     token = ViewToken(name="wall", robot="s/r", view="front", hash="", created=datetime.now(UTC))
 
-    async def main():
-        working, sent = asyncio.Event(), []
+    working, sent = asyncio.Event(), []
 
-        async def handle(scope, receive, send):
-            working.set()
-            await asyncio.Event().wait()
+    async def handle(scope, receive, send):
+        working.set()
+        await asyncio.Event().wait()
 
-        async def send(message):
-            sent.append(message)
+    async def send(message):
+        sent.append(message)
 
-        middleware = AuthMiddleware(
-            handle, create_autospec(AuthService, sessions=None, tokens=None), "cookie", ()
-        )
-        granted = view_access.TokenRequest(token, set())
-        serving = asyncio.create_task(middleware._serve(granted, {"type": "http"}, None, send))
-        await working.wait()
-        granted.end()
-        await serving
-        assert sent[0]["status"] == 401
-
-    run(main())
+    middleware = AuthMiddleware(
+        handle, create_autospec(AuthService, sessions=None, tokens=None), "cookie", ()
+    )
+    granted = view_access.TokenRequest(token, set())
+    serving = asyncio.create_task(middleware._serve(granted, {"type": "http"}, None, send))
+    await working.wait()
+    granted.end()
+    await serving
+    assert sent[0]["status"] == 401
 
 
 @pytest.mark.parametrize("origin", [None, LISTED, "https://evil.example"])
-def test_a_token_works_without_an_origin_and_browsers_show_it_on_listed_origins_only(
+async def test_a_token_works_without_an_origin_and_browsers_show_it_on_listed_origins_only(
     mesh, page, tmp_path, origin
 ):
-    async def main():
-        async with shown(mesh, page, tmp_path, embed=(LISTED,)) as (client, _, _, file):
-            token = allow(file)
-            path = f"/image/s/r/front.jpg?token={token}"
-            await until_known(client, path)
-            status, headers, _ = await client.get(path, **({"Origin": origin} if origin else {}))
-            assert status == 200
-            allowed = origin == LISTED
-            assert headers["cross-origin-resource-policy"] == ("cross-origin" if allowed else "same-origin")
-            assert headers.get("access-control-allow-origin") == (LISTED if allowed else None)
-            assert "access-control-allow-credentials" not in headers
-
-    run(main())
+    async with shown(mesh, page, tmp_path, embed=(LISTED,)) as (client, _, _, file):
+        token = allow(file)
+        path = f"/image/s/r/front.jpg?token={token}"
+        await until_known(client, path)
+        status, headers, _ = await client.get(path, **({"Origin": origin} if origin else {}))
+        assert status == 200
+        allowed = origin == LISTED
+        assert headers["cross-origin-resource-policy"] == ("cross-origin" if allowed else "same-origin")
+        assert headers.get("access-control-allow-origin") == (LISTED if allowed else None)
+        assert "access-control-allow-credentials" not in headers
 
 
-def test_without_accounts_addresses_with_a_token_work_too(mesh, page, tmp_path):
-    async def main():
-        async with console(mesh, page) as (address, other), rendering(other):
-            assert (await get(address, "/image/s/r/front.jpg?token=x"))[0] == 200
-            status, view = await live_view(address, "/view/s/r/front/live?token=x")
-            assert status == 200
-            view.close()
-
-    run(main())
+async def test_without_accounts_addresses_with_a_token_work_too(mesh, page, tmp_path):
+    async with console(mesh, page) as (address, other), rendering(other):
+        assert (await get(address, "/image/s/r/front.jpg?token=x"))[0] == 200
+        status, view = await live_view(address, "/view/s/r/front/live?token=x")
+        assert status == 200
+        view.close()
 
 
 def test_the_command_adds_lists_and_revokes_and_prints_a_token_once(tmp_path, capsys):

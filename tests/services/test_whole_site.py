@@ -124,17 +124,14 @@ def test_joints_arrive_where_they_were_sent_and_the_recording_holds_all_that_a_m
     assert {"joints", "controller", "frames", "description", "free"} <= set(counts)
 
 
-def test_home_brings_the_joints_home(site):
+async def test_home_brings_the_joints_home(site):
     result = site.command("send", "arm", "home")
     assert result.returncode == 0, result.stderr + result.stdout
 
-    async def main():
-        async with open_session(site.mesh) as session:
-            description = await last_value(session, "robomesh/test/arm/description")
-            homes = [degrees(joint.home) for joint in description.joints]
-            assert await last_positions(session) == pytest.approx(homes, abs=0.02)
-
-    run(main())
+    async with open_session(site.mesh) as session:
+        description = await last_value(session, "robomesh/test/arm/description")
+        homes = [degrees(joint.home) for joint in description.joints]
+        assert await last_positions(session) == pytest.approx(homes, abs=0.02)
 
 
 @pytest.fixture
@@ -236,18 +233,15 @@ def test_a_move_beyond_a_limit_is_refused_in_words_and_audited(site):
     assert robomesh("audit", "verify", str(forged)).returncode == 1
 
 
-def test_forward_kinematics_is_answered_and_wrong_counts_are_refused(site):
-    async def main():
-        async with open_session(site.mesh) as session:
-            key = "robomesh/test/arm/kinematics/forward"
-            sample = [radians(q) for q in (100.0, 30.45, 92.66, -67.10, -25.85)]
-            answer = await session.ask(key, schema.ForwardRequest(joint_positions=sample))
-            x, y, z = (answer.tool_to_base[index] for index in (3, 7, 11))
-            assert (x, y, z) == pytest.approx((-0.0281, 0.1594, 0.8528), abs=1e-4)
-            with refused(codes.JOINT_COUNT_OF_FIELD):
-                await session.ask(key, schema.ForwardRequest(joint_positions=[0.0]))
-
-    run(main())
+async def test_forward_kinematics_is_answered_and_wrong_counts_are_refused(site):
+    async with open_session(site.mesh) as session:
+        key = "robomesh/test/arm/kinematics/forward"
+        sample = [radians(q) for q in (100.0, 30.45, 92.66, -67.10, -25.85)]
+        answer = await session.ask(key, schema.ForwardRequest(joint_positions=sample))
+        x, y, z = (answer.tool_to_base[index] for index in (3, 7, 11))
+        assert (x, y, z) == pytest.approx((-0.0281, 0.1594, 0.8528), abs=1e-4)
+        with refused(codes.JOINT_COUNT_OF_FIELD):
+            await session.ask(key, schema.ForwardRequest(joint_positions=[0.0]))
 
 
 def test_snapshot_saves_a_picture(site, tmp_path):
@@ -300,7 +294,7 @@ def test_monitor_prints_a_line_a_state(site):
 @pytest.mark.parametrize(
     "victim", ["simulate", "gateway", "kinematics", "recorder", "renderer", "console", "router"]
 )
-def test_a_killed_service_comes_back_and_the_others_did_not_notice(site, victim):
+async def test_a_killed_service_comes_back_and_the_others_did_not_notice(site, victim):
     before = site.children()
     kill(before[victim])
     wait_until(
@@ -311,14 +305,11 @@ def test_a_killed_service_comes_back_and_the_others_did_not_notice(site, victim)
         name: pid for name, pid in before.items() if name != victim
     }
 
-    async def main():
-        async with open_session(site.mesh) as session:
-            for topic in ("joints", "frames", "controller"):
-                async for sample in session.subscribe(f"robomesh/test/arm/{topic}", history=False):
-                    assert sample.live
-                    break
-
-    run(main())
+    async with open_session(site.mesh) as session:
+        for topic in ("joints", "frames", "controller"):
+            async for sample in session.subscribe(f"robomesh/test/arm/{topic}", history=False):
+                assert sample.live
+                break
 
 
 @pytest.fixture
