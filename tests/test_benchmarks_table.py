@@ -2,8 +2,6 @@
 
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import pytest
 
 from benchmarks import run_all
 from benchmarks.harness import program
+from tests.site import alive, wait_until
 
 # From real runs, shortened.
 GATEWAY = {
@@ -144,24 +143,9 @@ def test_end_of_a_program_ends_all_that_it_started(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(run_all, "ENDS_WITHIN_S", 0.2)
     process = subprocess.Popen([sys.executable, str(program)], start_new_session=True)
     try:
-        assert eventually(told.exists)
+        wait_until(told.exists)
     finally:
         run_all.end(process)
 
     assert process.returncode is not None
-    assert eventually(lambda: ended(int(told.read_text())))
-
-
-def ended(pid: int) -> bool:
-    """Return whether a process has ended; a zombie has."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-    except OSError:
-        return True
-
-
-def eventually(condition: Callable[[], bool]) -> bool:
-    deadline_s = time.monotonic() + 60.0
-    while not condition() and time.monotonic() < deadline_s:
-        time.sleep(0.02)
-    return condition()
+    wait_until(lambda: not alive(int(told.read_text())))

@@ -34,6 +34,15 @@ PAGES = {
 HOME = ["0.00°", "90.00°", "−90.00°", "0.00°", "0.00°"]
 
 
+def until(page, condition, *, seconds=40):
+    """Wait for a condition that no locator can see, while the page goes on."""
+    for _ in range(10 * seconds):
+        if condition():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it did not come about in time")
+
+
 def button(page, name):
     return page.get_by_role("button", name=name, exact=True)
 

@@ -6,16 +6,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.browser.crowd import crowd
-from tests.browser.robot_page import (
-    button,
-    drawings,
-    joint_value,
-    region,
-    serious,
-    tile,
-    tiles,
-    visit,
-)
+from tests.browser.robot_page import button, drawings, joint_value, region, serious, tile, tiles, until, visit
 
 pytestmark = pytest.mark.browser
 
@@ -28,15 +19,6 @@ def many(plant):
     """Yield robots of another site than the console's."""
     with crowd(plant.endpoint, ("yard",), COUNT) as held:
         yield held
-
-
-def until(page, holds, *, seconds=30):
-    """Wait for a condition that no locator can see."""
-    for _ in range(10 * seconds):
-        if holds():
-            return
-        page.wait_for_timeout(100)
-    raise AssertionError("it did not come to hold")
 
 
 def test_of_two_hundred_robots_only_the_tiles_in_sight_are_watched_and_drawn(open_page, many):

@@ -14,6 +14,7 @@ from tests.browser.robot_page import (
     stop_notice,
     take,
     tiles,
+    until,
 )
 
 pytestmark = pytest.mark.browser
@@ -44,15 +45,6 @@ window.WebSocket = class extends WebSocket {
 """
 
 
-def until(page, true):
-    """Wait for a condition that the page's policy lets no locator evaluate."""
-    for _ in range(400):
-        if page.evaluate(true):
-            return
-        page.wait_for_timeout(100)
-    raise AssertionError(f"it never came to {true}")
-
-
 def open_idle(open_page):
     """Open the arm's page with a clock and a connection that the test controls."""
     page = open_page(ARM, drawn=False)
@@ -72,9 +64,9 @@ def test_a_line_that_died_in_silence_is_told_and_opened_anew_and_sleep_makes_not
     lost = page.get_by_role("alert").filter(has_text="No connection to the console since")
     expect(lost).to_have_count(0)
     page.evaluate(PASSED.format(6e3))
-    until(page, "sockets[0].lost > 0")  # it asks whether anybody is there
+    until(page, lambda: page.evaluate("sockets[0].lost > 0"))  # it asks whether anybody is there
     page.evaluate(PASSED.format(16e3))
-    until(page, "sockets.length > 1")
+    until(page, lambda: page.evaluate("sockets.length > 1"))
     page.evaluate("steady = 0")  # no source is behind by it
     expect(lost).to_have_count(0)
     expect(state_word(page)).to_have_text("Idle")
@@ -86,7 +78,7 @@ def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page)
     page.evaluate(DEAD)
     stop_button(page).click()
     page.evaluate("wall -= 60e3")  # it is recent, however slow this machine is
-    until(page, "sockets[0].lost > 0 && sockets.length > 1")
+    until(page, lambda: page.evaluate("sockets[0].lost > 0 && sockets.length > 1"))
     expect(stop_notice(page)).to_contain_text("Stop sent to hall/arm")
     take(page)
     clear_stop(page)
@@ -95,7 +87,7 @@ def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page)
 @pytest.mark.parametrize("dead", [LINE_DEAD, STOPS_DEAD])
 def test_a_stop_request_needs_only_one_of_the_pages_two_lines(open_page, dead):
     page = open_idle(open_page)
-    until(page, "stopSockets.at(-1)?.readyState === WebSocket.OPEN")
+    until(page, lambda: page.evaluate("stopSockets.at(-1)?.readyState === WebSocket.OPEN"))
     page.evaluate(dead)
     stop_button(page).click()
     expect(stop_notice(page)).to_contain_text("Stop sent to hall/arm")

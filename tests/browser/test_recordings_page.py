@@ -27,6 +27,7 @@ from tests.browser.robot_page import (
     serious,
     stop_button,
     tiles,
+    until,
 )
 
 pytestmark = pytest.mark.browser
@@ -196,15 +197,6 @@ def arm(page):
 
 def moment_line(page):
     return curves(page).locator(".moment-line").evaluate("line => line.getBoundingClientRect().left")
-
-
-def until(page, condition):
-    """Wait until a condition holds."""
-    for _ in range(200):
-        if condition():
-            return
-        page.wait_for_timeout(100)
-    raise AssertionError("it does not come true")
 
 
 def test_a_recording_is_listed_and_played_and_a_seek_moves_arm_curves_and_clock(open_page, recorded):

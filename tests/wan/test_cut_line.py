@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.site import wait_until
 from tests.wan.network import Link, Network, missing
 from tests.wan.sites import ARM, PORT, Probe, Site
 
@@ -47,16 +48,16 @@ class Plant:
 
     def cut(self) -> None:
         """Cut the line until both routers have closed the link: no buffered message is left."""
-        until(lambda: self._seen() == {GATEWAY, HUB})
+        wait_until(lambda: self._seen() == {GATEWAY, HUB})
         self.line.change(cut=True)
         self.far.until(JOINTS, stale=True, within_s=60.0)
-        until(lambda: not self._seen())
+        wait_until(lambda: not self._seen())
 
     def mend(self) -> None:
         """Restore the line until live joints arrive and, later, each router knows the other side."""
         self.line.change(cut=False)
         self.far.until(JOINTS, stale=False, within_s=60.0)
-        until(lambda: self._seen() == {GATEWAY, HUB})
+        wait_until(lambda: self._seen() == {GATEWAY, HUB})
 
     def _seen(self) -> set[str]:
         """Return the participants of the other side that each side sees."""
@@ -66,14 +67,6 @@ class Plant:
     def _count_stops(self) -> None:
         for _ in self.site.processes["controller"].stdout or ():
             self.stops += 1
-
-
-def until(condition):
-    """Wait until it holds."""
-    deadline = time.monotonic() + 60.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 @pytest.fixture(scope="module")
@@ -96,8 +89,8 @@ def test_joints_are_as_late_as_the_line_and_no_earlier(plant):
         return len(lags) > 20
 
     # Those that were on their way when the line grew longer may still come.
-    until(lambda: any(lag >= DELAY_S for _, lag, live, *_ in plant.far.do("samples", JOINTS) if live))
-    until(came)
+    wait_until(lambda: any(lag >= DELAY_S for _, lag, live, *_ in plant.far.do("samples", JOINTS) if live))
+    wait_until(came)
     assert min(lags) >= DELAY_S
 
 
@@ -114,10 +107,10 @@ def test_a_cut_line_is_seen_as_stale_and_silences_nobody_at_the_plant(plant):
         assert answer["answer"]["sent"], answer
         return any("while the line was cut" in text for _, text in told(plant.near))
 
-    until(stopped)
+    wait_until(stopped)
     assert plant.far.do("state", JOINTS, JOINTS)["age_s"] > 1.0
     plant.mend()
-    until(lambda: told(plant.far) == told(plant.near))
+    wait_until(lambda: told(plant.far) == told(plant.near))
 
 
 def test_a_stop_over_a_line_that_loses_is_done_once(plant):
@@ -130,7 +123,7 @@ def test_a_stop_over_a_line_that_loses_is_done_once(plant):
         time.sleep(0.12)  # those closer than 0.1 s share a unit
     # One more from the arm's side, which arrives after all others.
     last = plant.near.do("ask", STOP, {"by": "li"}, 20.0)["answer"]["stop_id"]
-    until(lambda: plant.stops >= before + 9)
+    wait_until(lambda: plant.stops >= before + 9)
     assert plant.stops == before + 9
     # A repeat of the latched stop keeps its number.
     assert numbers == {str(int(last) - 1)}
@@ -150,7 +143,7 @@ def test_what_was_kept_back_comes_late_and_never_looks_live(plant):
         )
         return late
 
-    until(came)
+    wait_until(came)
     # Each is as old as its own time says, but for what the quickest took.
     assert all(age > lag - 0.3 for lag, age in late), late
 
@@ -165,7 +158,7 @@ def test_losses_are_counted_over_a_cut(plant):
             found.append(plant.far.do("sequence", JOINTS, JOINTS))
             return found[-1] == found[-2]
 
-        until(quiet)
+        wait_until(quiet)
         return found[-1]
 
     plant.cut()
