@@ -556,21 +556,18 @@ def test_the_motions_of_a_gateway_that_was_frozen_end_when_it_goes_on(mesh, tmp_
 
 
 @pytest.mark.processes
-def test_a_command_that_waited_for_a_frozen_gateway_is_not_sent(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with (
-            watched(UnitMover, mesh, monkeypatch) as arm,
-            gateway_process(mesh, tmp_path, [arm.settings()]) as process,
-        ):
-            await all_in_control([arm])
-            with frozen(process):
-                late = asyncio.create_task(refusal(arm.move(0.1)))
-                await asyncio.sleep(1.5)
-            assert "Not sent" in await late
-            assert not arm.site.controller.HasField("stop")
-            judge(arm, motions=0)
-            target = await arm.moved(0.1)
-            async with kept_control(arm.site):
-                await until(lambda: near(arm.positions(), target))
-
-    run(main(), timeout_s=90.0)
+async def test_a_command_that_waited_for_a_frozen_gateway_is_not_sent(mesh, tmp_path, monkeypatch):
+    async with (
+        watched(UnitMover, mesh, monkeypatch) as arm,
+        gateway_process(mesh, tmp_path, [arm.settings()]) as process,
+    ):
+        await all_in_control([arm])
+        with frozen(process):
+            late = asyncio.create_task(refusal(arm.move(0.1)))
+            await asyncio.sleep(1.5)
+        assert "Not sent" in await late
+        assert not arm.site.controller.HasField("stop")
+        judge(arm, motions=0)
+        target = await arm.moved(0.1)
+        async with kept_control(arm.site):
+            await until(lambda: near(arm.positions(), target))

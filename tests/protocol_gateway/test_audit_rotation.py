@@ -207,17 +207,13 @@ def test_a_killed_rotation_leaves_an_intact_log_and_its_stop(tmp_path, call, whe
     assert not live.with_suffix(".new").exists()
 
 
-def test_a_log_that_cannot_be_rotated_continues_in_its_file(tmp_path, caplog):
+async def test_a_log_that_cannot_be_rotated_continues_in_its_file(tmp_path, caplog):
     live = tmp_path / "arm.jsonl"
-
-    async def main():
-        log = AuditLog(live, rotate_bytes=SMALL)
-        part_name(live, 1).write_text("somebody's copy\n")
-        for number in range(20):
-            await log.append(entry(number))
-        await log.close()
-
-    run(main())
+    log = AuditLog(live, rotate_bytes=SMALL)
+    part_name(live, 1).write_text("somebody's copy\n")
+    for number in range(20):
+        await log.append(entry(number))
+    await log.close()
     assert "was not rotated: " in caplog.text
     assert caplog.text.count("was not rotated") <= live.stat().st_size // SMALL
     assert not live.with_suffix(".new").exists()

@@ -14,7 +14,6 @@ from controllers.simulated.errors import SimulatorError
 from controllers.simulated.fault_requests import Mesh
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings
-from tests.conftest import run
 from tests.protocol_gateway.faulty_site import faulty_site
 from tests.protocol_gateway.gateway_site import STATE, gateway, refusal, simulator, until
 
@@ -139,26 +138,23 @@ async def simulator_in_namespace(name):
         await process.wait()
 
 
-def test_a_vanished_host_is_detected_in_seconds_and_reconnected(mesh, tmp_path):
-    async def main():
-        with another_host() as (name, cable):
-            async with (
-                simulator_in_namespace(name),
-                gateway(mesh, tmp_path, 5400, host="10.219.77.2") as site,
-            ):
-                ip("-n", name, "link", "set", cable, "down")
-                await until(lambda: site.controller.link == STATE.SILENT)
-                joints = len(site.seen["joints"])
-                await until(lambda: site.controller.link == STATE.DOWN)
-                await until(lambda: site.events("link.down"))
-                await until(
-                    lambda: (
-                        "cannot connect" in site.controller.link_text
-                        or "does not answer" in site.controller.link_text
-                    )
+async def test_a_vanished_host_is_detected_in_seconds_and_reconnected(mesh, tmp_path):
+    with another_host() as (name, cable):
+        async with (
+            simulator_in_namespace(name),
+            gateway(mesh, tmp_path, 5400, host="10.219.77.2") as site,
+        ):
+            ip("-n", name, "link", "set", cable, "down")
+            await until(lambda: site.controller.link == STATE.SILENT)
+            joints = len(site.seen["joints"])
+            await until(lambda: site.controller.link == STATE.DOWN)
+            await until(lambda: site.events("link.down"))
+            await until(
+                lambda: (
+                    "cannot connect" in site.controller.link_text
+                    or "does not answer" in site.controller.link_text
                 )
-                assert len(site.seen["joints"]) == joints
-                ip("-n", name, "link", "set", cable, "up")
-                await until(lambda: site.controller.link == STATE.UP, timeout_s=20.0)
-
-    run(main(), timeout_s=60.0)
+            )
+            assert len(site.seen["joints"]) == joints
+            ip("-n", name, "link", "set", cable, "up")
+            await until(lambda: site.controller.link == STATE.UP, timeout_s=20.0)

@@ -5,7 +5,6 @@ import math
 import time
 
 from robomesh.contract.keys import robot_key
-from tests.conftest import run
 from tests.protocol_gateway.faulty_site import faulty_site
 from tests.protocol_gateway.gateway_site import (
     STATE,
@@ -228,21 +227,18 @@ async def test_a_flood_does_not_reach_old_client_programs(mesh, tmp_path):
         assert 0 < sent < 400 * (time.monotonic() - begin_s)
 
 
-def test_a_deluge_is_discarded_until_it_ends(mesh, tmp_path):
-    async def main():
-        async with faulty_site(mesh, tmp_path) as (site, fault):
-            await fault("deluge")
-            await until(lambda: site.events("link.deluge"))
-            await until(lambda: site.controller.link == STATE.SILENT)
-            assert (await site.stop(by="wang")).sent
-            await fault("deluge", off=True)
-            await until(lambda: site.controller.link == STATE.UP, timeout_s=20.0)
-            await until(lambda: site.controller.activity == STATE.STOPPED)
-            before = len(site.seen["joints"])
-            await until(lambda: len(site.seen["joints"]) > before + 20)
-            assert site.controller.counters.connections == 1
-
-    run(main(), timeout_s=60.0)
+async def test_a_deluge_is_discarded_until_it_ends(mesh, tmp_path):
+    async with faulty_site(mesh, tmp_path) as (site, fault):
+        await fault("deluge")
+        await until(lambda: site.events("link.deluge"))
+        await until(lambda: site.controller.link == STATE.SILENT)
+        assert (await site.stop(by="wang")).sent
+        await fault("deluge", off=True)
+        await until(lambda: site.controller.link == STATE.UP, timeout_s=20.0)
+        await until(lambda: site.controller.activity == STATE.STOPPED)
+        before = len(site.seen["joints"])
+        await until(lambda: len(site.seen["joints"]) > before + 20)
+        assert site.controller.counters.connections == 1
 
 
 async def test_units_in_pieces_are_units(mesh, tmp_path):

@@ -22,7 +22,6 @@ from protocol_gateway.seam import (
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of, violations
 from robots.kinematics.model import build_model, tool_placement
-from tests.conftest import run
 from tests.controllers.fanuc.test_snpx_driver import controller
 from tests.protocol_gateway.gateway_site import until
 from tests.protocol_gateway.scripted_controller import endless_joints
@@ -90,12 +89,9 @@ def model_positions(axes):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("fanuc_ucl") is None, reason="fanuc_ucl is not installed")
-def test_fanuc_ucl_reads_the_simulated_controller():
-    async def main():
-        async with controller(listen=f"{UCL_HOST}:60008", faults=("fault",)):
-            return await output_of(sys.executable, "-c", READ_UCL, UCL_HOST)
-
-    found = run(main())
+async def test_fanuc_ucl_reads_the_simulated_controller():
+    async with controller(listen=f"{UCL_HOST}:60008", faults=("fault",)):
+        found = await output_of(sys.executable, "-c", READ_UCL, UCL_HOST)
     assert model_positions(found["axes"]) == pytest.approx(PUMA.home, abs=1e-6)
     placement = tool_placement(build_model(load("puma560")), PUMA.home)
     assert found["pose"][:3] == pytest.approx(placement[:3, 3] * 1000, abs=0.01)
@@ -111,12 +107,9 @@ def test_fanuc_ucl_reads_the_simulated_controller():
 @pytest.mark.skipif(
     importlib.util.find_spec("snpx_client") is None, reason="snpx_client.py is not on the PYTHONPATH"
 )
-def test_snpx_client_reads_the_simulated_controller():
-    async def main():
-        async with controller(demo=True) as port:
-            return await output_of(sys.executable, "-c", READ_CLIENT, str(port))
-
-    found = run(main())
+async def test_snpx_client_reads_the_simulated_controller():
+    async with controller(demo=True) as port:
+        found = await output_of(sys.executable, "-c", READ_CLIENT, str(port))
     assert not violations(PUMA, model_positions(found["axes"]))
     assert found["di"] == found["do"]
     assert len(found["di"]) == 16
@@ -126,32 +119,29 @@ def test_snpx_client_reads_the_simulated_controller():
     not SERVER,
     reason="SNPX_SERVER does not name the program of snpx_server beside this file, which uses fanuc_ucl",
 )
-def test_a_server_with_fanuc_ucl_reads_every_packet_of_the_driver():
-    async def main():
-        events = []
-        server = await asyncio.create_subprocess_exec(SERVER, stdout=asyncio.subprocess.PIPE)
-        port = int(await server.stdout.readline())
-        settings = FanucSettings(assignments="own", j23=1, registers=(5, 7))
-        driver = SnpxDriver(PUMA.types, {}, options=settings)
-        link = ControllerLink(
-            LinkSettings(host="127.0.0.1", port=port),
-            driver,
-            endless_joints(6),
-            on_event=lambda event, _: events.append(event),
-        )
-        task = asyncio.create_task(link.run())
-        try:
-            await until(lambda: sum(isinstance(each, JointsReceived) for each in events) > 40)
-        finally:
-            task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
-            server.terminate()
-            lines = (await server.stdout.read()).decode().splitlines()
-            await server.wait()
-        return events, lines, settings.table
-
-    events, lines, table = run(main())
+async def test_a_server_with_fanuc_ucl_reads_every_packet_of_the_driver():
+    events = []
+    server = await asyncio.create_subprocess_exec(SERVER, stdout=asyncio.subprocess.PIPE)
+    port = int(await server.stdout.readline())
+    settings = FanucSettings(assignments="own", j23=1, registers=(5, 7))
+    driver = SnpxDriver(PUMA.types, {}, options=settings)
+    link = ControllerLink(
+        LinkSettings(host="127.0.0.1", port=port),
+        driver,
+        endless_joints(6),
+        on_event=lambda event, _: events.append(event),
+    )
+    task = asyncio.create_task(link.run())
+    try:
+        await until(lambda: sum(isinstance(each, JointsReceived) for each in events) > 40)
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        server.terminate()
+        lines = (await server.stdout.read()).decode().splitlines()
+        await server.wait()
+    events, lines, table = events, lines, settings.table
     commands = ["CLRASG", *(each.command for each in table.assignments)]
     assert lines[: 2 + len(commands)] == ["init", "session", *commands]
     # The robot's outputs are the inputs of the PLC, as fanuc_ucl names them here.

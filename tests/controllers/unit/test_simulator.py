@@ -154,7 +154,7 @@ async def test_a_client_that_does_not_read_delays_no_other_and_is_closed():
                     pass
 
 
-def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
+async def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
     def connect_and_disconnect(port):
         for number in range(25):
             with socket.create_connection(("127.0.0.1", port), timeout=5) as one:
@@ -162,14 +162,11 @@ def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
                 while time.monotonic() < end:
                     assert one.recv(65536)
 
-    async def main():
-        async with simulator(demo=True, faults=("deluge",)) as port:
-            await asyncio.to_thread(connect_and_disconnect, port)
-            # The last one's callbacks have run when another client gets a state.
-            async with client(port) as last:
-                await last.state(lambda *records: True)
-
-    run(main())
+    async with simulator(demo=True, faults=("deluge",)) as port:
+        await asyncio.to_thread(connect_and_disconnect, port)
+        # The last one's callbacks have run when another client gets a state.
+        async with client(port) as last:
+            await last.state(lambda *records: True)
     assert not [record for record in caplog.records if record.name == "asyncio"]
 
 

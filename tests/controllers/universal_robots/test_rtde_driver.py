@@ -38,7 +38,7 @@ from robomesh.wire.session import open_session
 from robots.descriptions.description import load
 from robots.kinematics.joints import JointType
 from robots.kinematics.model import build_model, tool_placement
-from tests.conftest import free_port, last_value, run
+from tests.conftest import free_port, last_value
 from tests.controllers.simulated_site import running
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.wire import wire
@@ -317,18 +317,15 @@ async def whole_controller(**settings):
         yield ports.rtde, ports.primary, ports.scripts[0], ports.dashboard
 
 
-def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path):
-    async def main():
-        async with (
-            controller() as (port, primary),
-            gateway(mesh, tmp_path, port, **UR, ports={"primary": primary}) as site,
-            open_session(mesh) as session,
-        ):
-            await until(lambda: site.joints)
-            message = await last_value(session, site.key("signals"))
-            return site.joints, {each.name: each.number for each in message.signals}
-
-    joints, numbers = run(main())
+async def test_the_controllers_cartesian_position_is_that_of_its_joints(mesh, tmp_path):
+    async with (
+        controller() as (port, primary),
+        gateway(mesh, tmp_path, port, **UR, ports={"primary": primary}) as site,
+        open_session(mesh) as session,
+    ):
+        await until(lambda: site.joints)
+        message = await last_value(session, site.key("signals"))
+        joints, numbers = site.joints, {each.name: each.number for each in message.signals}
     tool = tool_placement(build_model(load("puma560")), joints)
     assert [numbers[f"tool.pose.{axis}"] for axis in "xyz"] == pytest.approx(tool[:3, 3], abs=1e-6)
 

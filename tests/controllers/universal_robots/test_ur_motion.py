@@ -11,7 +11,6 @@ from controllers.universal_robots import motion_script
 from protocol_gateway.checking.checker import Checker
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
-from tests.conftest import run
 from tests.controllers.simulated_site import move
 from tests.controllers.universal_robots.ur_site import UR, controller, in_control, movable, others, runs
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, moving, refusal, resting, until
@@ -61,24 +60,20 @@ async def test_targets_are_absolute_and_programs_hold_numbers_only(mesh, tmp_pat
         assert "no HOLD" in await refusal(site.command(C.HOLD))
 
 
-def test_a_program_makes_one_motion_after_the_other(mesh, tmp_path, monkeypatch):
+async def test_a_program_makes_one_motion_after_the_other(mesh, tmp_path, monkeypatch):
     text = "speed 100\nmove_joints 3 -90 180 0 45 0\nmove_joints 0 -90 180 0 48 0\n"
-
-    async def main():
-        async with (
-            controller(monkeypatch) as (ports, server),
-            wire(ports.scripts[0]) as gate,
-            movable(mesh, tmp_path, ports, ports={**others(ports), "scripts": gate.port}) as site,
-        ):
-            await in_control(site)
-            start_at = positions(server)
-            await start(site, text)
-            await ended(site, schema.ProgramState.DONE)
-            assert gate.data.count(b"movej(") == 2
-            assert positions(server)[4] == pytest.approx(start_at[4] + math.radians(3), abs=1e-3)
-            assert not site.controller.HasField("stop")
-
-    run(main(), timeout_s=120.0)
+    async with (
+        controller(monkeypatch) as (ports, server),
+        wire(ports.scripts[0]) as gate,
+        movable(mesh, tmp_path, ports, ports={**others(ports), "scripts": gate.port}) as site,
+    ):
+        await in_control(site)
+        start_at = positions(server)
+        await start(site, text)
+        await ended(site, schema.ProgramState.DONE)
+        assert gate.data.count(b"movej(") == 2
+        assert positions(server)[4] == pytest.approx(start_at[4] + math.radians(3), abs=1e-3)
+        assert not site.controller.HasField("stop")
 
 
 async def test_a_changed_payload_is_confirmed_with_a_reason_by_an_operator_who_has_looked(

@@ -13,7 +13,6 @@ from controllers.universal_robots.simulated.service import UrSettings, serve_rtd
 from protocol_gateway.seam import Report, Send, SignalsReceived
 from robots.descriptions.description import load
 from robots.kinematics.joints import JointType, joints_of, violations
-from tests.conftest import run
 from tests.controllers.simulated_site import running
 
 pytestmark = [
@@ -243,12 +242,11 @@ async def test_program_of_ur_rtde_moves_and_stops_the_arm_and_its_watchdog_ends_
     assert stopped[1:] == pytest.approx(target[1:], abs=1e-9)
 
 
-def test_ur_rtde_moves_the_tool_on_a_line_at_a_speed_and_by_targets():
-    async def main():
-        async with simulator("127.0.31.7", demo=False):
-            return await client_of("127.0.31.7", LINE)
-
-    begin, target, on_line, there, stopped, refused, speed, joints, reached = run(main())
+async def test_ur_rtde_moves_the_tool_on_a_line_at_a_speed_and_by_targets():
+    async with simulator("127.0.31.7", demo=False):
+        begin, target, on_line, there, stopped, refused, speed, joints, reached = await client_of(
+            "127.0.31.7", LINE
+        )
     assert there == pytest.approx(target, abs=1e-6)
     for x, y, *others in (*on_line, stopped):
         assert [y, *others] == pytest.approx([begin[1] - 2 * (x - begin[0]), *begin[2:]], abs=1e-5)
@@ -258,12 +256,11 @@ def test_ur_rtde_moves_the_tool_on_a_line_at_a_speed_and_by_targets():
     assert reached == pytest.approx(joints, abs=1e-3)
 
 
-def test_dashboard_client_of_ur_rtde_recovers_the_arm():
-    async def main():
-        async with simulator("127.0.31.6", faults=("fault@0+600",)):
-            return await client_of("127.0.31.6", RECOVER)
-
-    remote, safety, mode, young, unlocked, program, restarted, running, plays = run(main())
+async def test_dashboard_client_of_ur_rtde_recovers_the_arm():
+    async with simulator("127.0.31.6", faults=("fault@0+600",)):
+        remote, safety, mode, young, unlocked, program, restarted, running, plays = await client_of(
+            "127.0.31.6", RECOVER
+        )
     assert remote
     assert ("PROTECTIVE_STOP" in safety, "RUNNING" in mode) == (True, True)
     assert "5s after occurrence" in young

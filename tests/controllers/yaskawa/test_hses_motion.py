@@ -15,7 +15,6 @@ from controllers.yaskawa.simulated.controller import Refusal
 from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.errors import RefusedError
 from robots.kinematics.joints import JointType
-from tests.conftest import run
 from tests.controllers.simulated_site import move
 from tests.controllers.yaskawa.hses_site import (
     HOLD,
@@ -93,40 +92,37 @@ async def test_targets_are_absolute_pulses_and_nothing_else_is_written(mesh, tmp
         assert len(written(relay)) == 2
 
 
-def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, monkeypatch):
-    async def main():
-        # This controller is the worse of both kinds: it continues a held motion when HOLD ends.
-        async with (
-            controller(monkeypatch, held_motions_go_on=True) as (port, server),
-            movable(mesh, tmp_path, port) as (site, relay),
-        ):
-            await in_control(site)
-            target = await move(site, 2.0)
-            await until(lambda: moves(server))
-            assert (await site.stop(by="wang")).sent
-            await until(lambda: not moves(server))
-            assert abs(positions(server)[0] - target[0]) > 0.5
-            assert HOLD_ON in written(relay)
-            assert "stop 1 is latched" in await refusal(move(site, 0.1))
-            rest = positions(server)
-            await until_reset(site, server)
-            await site.units(20)
-            assert positions(server) == pytest.approx(rest)
-            assert written(relay).count(HOLD_OFF) == 1
-            await site.lease(A.RENEW, ttl_s=5)
-            await move(site, -0.2)
-            await moving(site)
-            await resting(site)
-            assert positions(server)[0] == pytest.approx(rest[0] - 0.2, abs=1e-4)
-            # At rest nothing is held back, so the servos stay on.
-            await site.stop(by="wang")
-            await until(lambda: site.controller.activity == STATE.HOLDING)
-            await site.lease(A.RENEW, ttl_s=5)
-            await site.command(C.RESET, stop_id=site.controller.stop.id)
-            await resting(site)
-            assert len(motions(relay)) == server.controller.commands == 2
-
-    run(main(), timeout_s=90.0)
+async def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, monkeypatch):
+    # This controller is the worse of both kinds: it continues a held motion when HOLD ends.
+    async with (
+        controller(monkeypatch, held_motions_go_on=True) as (port, server),
+        movable(mesh, tmp_path, port) as (site, relay),
+    ):
+        await in_control(site)
+        target = await move(site, 2.0)
+        await until(lambda: moves(server))
+        assert (await site.stop(by="wang")).sent
+        await until(lambda: not moves(server))
+        assert abs(positions(server)[0] - target[0]) > 0.5
+        assert HOLD_ON in written(relay)
+        assert "stop 1 is latched" in await refusal(move(site, 0.1))
+        rest = positions(server)
+        await until_reset(site, server)
+        await site.units(20)
+        assert positions(server) == pytest.approx(rest)
+        assert written(relay).count(HOLD_OFF) == 1
+        await site.lease(A.RENEW, ttl_s=5)
+        await move(site, -0.2)
+        await moving(site)
+        await resting(site)
+        assert positions(server)[0] == pytest.approx(rest[0] - 0.2, abs=1e-4)
+        # At rest nothing is held back, so the servos stay on.
+        await site.stop(by="wang")
+        await until(lambda: site.controller.activity == STATE.HOLDING)
+        await site.lease(A.RENEW, ttl_s=5)
+        await site.command(C.RESET, stop_id=site.controller.stop.id)
+        await resting(site)
+        assert len(motions(relay)) == server.controller.commands == 2
 
 
 async def test_hold_is_set_again_while_the_stop_is_latched(mesh, tmp_path, monkeypatch):
