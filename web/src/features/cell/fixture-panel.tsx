@@ -71,6 +71,9 @@ export function FixturePanel() {
 
 function Shape({ fixture, set }: { fixture: CellFixture; set: (edit: (fixture: CellFixture) => void) => void }) {
   const { shape, name } = fixture;
+  const size = (of: "radius" | "height", value: number, set: (value: number) => void) => (
+    <NumberField key={`${name} ${of}`} label={c(of)} quantity="length" positive value={value} set={set} />
+  );
   switch (shape.case) {
     case "box":
       return (
@@ -86,35 +89,18 @@ function Shape({ fixture, set }: { fixture: CellFixture; set: (edit: (fixture: C
     case "cylinder":
       return (
         <Fields label={c("size")}>
-          <NumberField
-            key={`${name} radius`}
-            label={c("radius")}
-            quantity="length"
-            positive
-            value={shape.value.radius}
-            set={(value) => set(({ shape }) => shape.case === "cylinder" && (shape.value.radius = value))}
-          />
-          <NumberField
-            key={`${name} height`}
-            label={c("height")}
-            quantity="length"
-            positive
-            value={shape.value.height}
-            set={(value) => set(({ shape }) => shape.case === "cylinder" && (shape.value.height = value))}
-          />
+          {size("radius", shape.value.radius, (value) =>
+            set(({ shape }) => shape.case === "cylinder" && (shape.value.radius = value)),
+          )}
+          {size("height", shape.value.height, (value) =>
+            set(({ shape }) => shape.case === "cylinder" && (shape.value.height = value)),
+          )}
         </Fields>
       );
     case "sphere":
       return (
         <Fields label={c("size")}>
-          <NumberField
-            key={`${name} radius`}
-            label={c("radius")}
-            quantity="length"
-            positive
-            value={shape.value}
-            set={(value) => set((each) => (each.shape = { case: "sphere", value: value }))}
-          />
+          {size("radius", shape.value, (value) => set((each) => (each.shape = { case: "sphere", value })))}
         </Fields>
       );
     case "mesh":

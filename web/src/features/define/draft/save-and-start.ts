@@ -77,7 +77,7 @@ export async function save(thenStart: boolean, over = ""): Promise<boolean> {
       }
       const problems = server.problemsOf(error);
       if (problems.length === 0) throw error;
-      checked.value = { tool: null, links: {}, ...checked.value, problems };
+      checked.value = { tool: null, ...checked.value, problems };
       outcome.value = { kind: "refused", text: d("mend_first") };
       openField(problems[0]?.path ?? []);
       return undefined;

@@ -46,7 +46,6 @@ export interface MeshInfo {
   max: [number, number, number];
   /** Of its surface, spread evenly. */
   points: [number, number, number][];
-  materials: string[];
   warnings: string[];
   missing: string[];
   /** Guessed metres in the file's unit. */
@@ -60,7 +59,6 @@ export interface Checked {
   problems: Problem[];
   /** 4x4 by rows, metres; null if the description has problems. */
   tool: number[][] | null;
-  links: Record<string, number[][]>;
 }
 
 /** Why a pair of links is ignored (the first three), or its shape for checks: robots/bodies/verdicts.py. */

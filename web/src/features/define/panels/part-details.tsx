@@ -1,5 +1,6 @@
 // The chosen part: a joint's motion, a link's appearance, the tool's pose.
 
+import { count } from "../../../i18n/format";
 import { defineText as d } from "../../../i18n/texts";
 import { Button } from "../../../ui/button";
 import { Choice } from "../../../ui/choice";
@@ -171,9 +172,7 @@ function MeshDetails({ path, body }: { path: string; body: Body }) {
   const unit = d("scale_metres");
   return (
     <>
-      <p class="dim small">
-        {d("mesh_facts", { count: info.triangles.toLocaleString("en"), size: `${size.join(" × ")} mm` })}
-      </p>
+      <p class="dim small">{d("mesh_facts", { count: count(info.triangles), size: `${size.join(" × ")} mm` })}</p>
       <div class="scale-row">
         <span class="label">{d("scale")}</span>
         <Choice

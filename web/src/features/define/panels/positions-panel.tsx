@@ -1,6 +1,7 @@
 // Sliders of the joints, and the server's position of the tool.
 
 import { Matrix4 } from "three";
+import { fixed } from "../../../i18n/format";
 import { defineText as d } from "../../../i18n/texts";
 import { Button } from "../../../ui/button";
 import { numberText } from "../../../ui/number-text";
@@ -102,12 +103,7 @@ function ToolAt() {
     <div key={label} class="right">
       <dt class="dim small">{label}</dt>
       <dd class="nowrap">
-        {value === undefined
-          ? "–"
-          : value
-              .toFixed(digits)
-              .replace(/^-(?=0\.?0*$)/, "")
-              .replace("-", "−")}
+        {fixed(value, digits)}
         <Unit of={unit} />
       </dd>
     </div>

@@ -120,9 +120,7 @@ export function ScenePanel() {
     event.preventDefault();
     scene.current?.view.turn(turn[0] ?? 0, turn[1] ?? 0);
   };
-  const views = ["free", ...new Set([...USUAL_VIEWS, ...Object.keys(now?.description.view ?? {})])].filter(
-    (name, index, all) => all.indexOf(name) === index,
-  );
+  const views = [...new Set(["free", ...USUAL_VIEWS, ...Object.keys(now?.description.view ?? {})])];
   return (
     <section class="panel scene define-scene" aria-label={d("scene")}>
       <div class="canvas-place">

@@ -2,6 +2,7 @@
 
 import { signal } from "@preact/signals";
 import { useEffect, useId, useMemo, useRef, useState } from "preact/hooks";
+import { count } from "../../../i18n/format";
 import { defineText as d } from "../../../i18n/texts";
 import { Button } from "../../../ui/button";
 import { Choice } from "../../../ui/choice";
@@ -118,63 +119,47 @@ function PasteDialog({ description, text: given, start }: { description: Descrip
                 />
               </Labelled>
               {(!found.decimal.sure || reading.decimal === "," || sign) && (
-                <Labelled label={d(found.decimal.sure ? "paste_decimal" : "paste_decimal_guess")}>
-                  <Choice
-                    label={d("paste_decimal")}
-                    values={[".", ","] as const}
-                    chosen={reading.decimal}
-                    text={(each) => d(each === "." ? "paste_point" : "paste_comma")}
-                    choose={setSign}
-                  />
-                </Labelled>
+                <LabelledChoice
+                  title={d(found.decimal.sure ? "paste_decimal" : "paste_decimal_guess")}
+                  label={d("paste_decimal")}
+                  values={[".", ","] as const}
+                  chosen={reading.decimal}
+                  text={(each) => d(each === "." ? "paste_point" : "paste_comma")}
+                  choose={setSign}
+                />
               )}
               {lacksUnit(columns, "length", read.rows) && (
-                <Labelled label={d("paste_lengths")}>
-                  <Choice
-                    label={d("paste_lengths")}
-                    values={["mm", "m"] as const}
-                    chosen={length}
-                    text={String}
-                    choose={setLength}
-                  />
-                </Labelled>
+                <LabelledChoice
+                  label={d("paste_lengths")}
+                  values={["mm", "m"] as const}
+                  chosen={length}
+                  text={String}
+                  choose={setLength}
+                />
               )}
               {lacksUnit(columns, "angle", read.rows) && (
-                <Labelled label={d("paste_angles")}>
-                  <Choice
-                    label={d("paste_angles")}
-                    values={["deg", "rad"] as const}
-                    chosen={angle}
-                    text={(each) => (each === "deg" ? "°" : "rad")}
-                    choose={setAngle}
-                  />
-                </Labelled>
-              )}
-              <Labelled label={d("paste_convention")}>
-                <Choice
-                  label={d("paste_convention")}
-                  values={CONVENTIONS}
-                  chosen={chosen}
-                  text={(each) => d(`paste_${each}`)}
-                  choose={setConvention}
+                <LabelledChoice
+                  label={d("paste_angles")}
+                  values={["deg", "rad"] as const}
+                  chosen={angle}
+                  text={(each) => (each === "deg" ? "°" : "rad")}
+                  choose={setAngle}
                 />
-              </Labelled>
+              )}
+              <LabelledChoice
+                label={d("paste_convention")}
+                values={CONVENTIONS}
+                chosen={chosen}
+                text={(each) => d(`paste_${each}`)}
+                choose={setConvention}
+              />
             </div>
             <Preview
-              columns={columns}
-              table={found}
-              rows={read.rows}
-              problems={read.problems}
-              first={first}
-              description={description}
+              {...{ ...read, columns, table: found, first, description }}
               mean={(index, meaning) => setMeanings(new Map([...meanings, [index, meaning]]))}
             />
             <Result
-              columns={columns}
-              table={found}
-              rows={read.rows}
-              problems={read.problems}
-              first={first}
+              {...{ ...read, columns, table: found, first }}
               joints={description.joint.length}
               modified={chosen === "modified"}
             />
@@ -195,6 +180,14 @@ function Labelled(props: { label: string; children: preact.ComponentChildren }) 
       <span class="label">{props.label}</span>
       {props.children}
     </div>
+  );
+}
+
+function LabelledChoice<Value extends string>(props: Parameters<typeof Choice<Value>>[0] & { title?: string }) {
+  return (
+    <Labelled label={props.title ?? props.label}>
+      <Choice {...props} />
+    </Labelled>
   );
 }
 
@@ -236,8 +229,8 @@ function PasteText(props: { text: string; set: (text: string) => void; refused: 
           <>
             <span class="shape warning" aria-hidden="true" />{" "}
             {d(`paste_${refused.refused}`, {
-              count: refused.count.toLocaleString("en"),
-              most: (refused.refused === "too_long" ? MOST_CHARACTERS : MOST_ROWS).toLocaleString("en"),
+              count: count(refused.count),
+              most: count(refused.refused === "too_long" ? MOST_CHARACTERS : MOST_ROWS),
             })}
           </>
         )}
