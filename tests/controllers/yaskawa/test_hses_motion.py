@@ -34,6 +34,17 @@ pytestmark = pytest.mark.slow
 HOLD_ON, HOLD_OFF = (HOLD, 1, 1), (HOLD, 1, 2)
 
 
+@contextlib.asynccontextmanager
+async def commanded(mesh, folder, monkeypatch, **settings):
+    """Control a movable robot; yield its simulated controller, site and wire."""
+    async with (
+        controller(monkeypatch, **settings) as (port, server),
+        movable(mesh, folder, port) as (site, relay),
+    ):
+        await in_control(site)
+        yield server, site, relay
+
+
 def positions(server):
     return server.controller.positions(time.monotonic())
 
@@ -94,11 +105,7 @@ async def test_targets_are_absolute_pulses_and_nothing_else_is_written(mesh, tmp
 
 async def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, monkeypatch):
     # This controller is the worse of both kinds: it continues a held motion when HOLD ends.
-    async with (
-        controller(monkeypatch, held_motions_go_on=True) as (port, server),
-        movable(mesh, tmp_path, port) as (site, relay),
-    ):
-        await in_control(site)
+    async with commanded(mesh, tmp_path, monkeypatch, held_motions_go_on=True) as (server, site, relay):
         target = await move(site, 2.0)
         await until(lambda: moves(server))
         assert (await site.stop(by="wang")).sent
@@ -126,11 +133,7 @@ async def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, 
 
 
 async def test_hold_is_set_again_while_the_stop_is_latched(mesh, tmp_path, monkeypatch):
-    async with (
-        controller(monkeypatch) as (port, server),
-        movable(mesh, tmp_path, port) as (site, relay),
-    ):
-        await in_control(site)
+    async with commanded(mesh, tmp_path, monkeypatch) as (server, site, relay):
         lost = []
 
         def loses_the_first(data):
@@ -155,11 +158,7 @@ async def test_hold_is_set_again_while_the_stop_is_latched(mesh, tmp_path, monke
 
 async def test_a_refused_copy_of_a_motion_says_nothing_about_it(mesh, tmp_path, monkeypatch):
     """UDP may double the motion, and the refusal of the copy may overtake the answer of the motion."""
-    async with (
-        controller(monkeypatch) as (port, server),
-        movable(mesh, tmp_path, port) as (site, relay),
-    ):
-        await in_control(site)
+    async with commanded(mesh, tmp_path, monkeypatch) as (server, site, relay):
         kept = []
 
         def overtaken(data):
@@ -180,11 +179,7 @@ async def test_a_refused_copy_of_a_motion_says_nothing_about_it(mesh, tmp_path, 
 
 
 async def test_a_refused_motion_is_over_and_its_refusal_is_shown(mesh, tmp_path, monkeypatch):
-    async with (
-        controller(monkeypatch) as (port, server),
-        movable(mesh, tmp_path, port) as (site, relay),
-    ):
-        await in_control(site)
+    async with commanded(mesh, tmp_path, monkeypatch) as (server, site, relay):
         monkeypatch.setattr(server.controller, "move", lambda *given: Refusal.NOT_REMOTE)
         await move(site, 0.3)
         event = await site.event("controller.refused", -1)
@@ -200,11 +195,7 @@ async def test_a_refused_motion_is_over_and_its_refusal_is_shown(mesh, tmp_path,
 
 
 async def test_a_late_answer_of_an_earlier_motion_says_nothing_about_a_later_one(mesh, tmp_path, monkeypatch):
-    async with (
-        controller(monkeypatch) as (port, _),
-        movable(mesh, tmp_path, port) as (site, relay),
-    ):
-        await in_control(site)
+    async with commanded(mesh, tmp_path, monkeypatch) as (_, site, relay):
         kept = []
         relay.answers = lambda data: kept.append(data) or [] if data[24] == 0x82 else [data]
         await move(site, 0.1)
@@ -218,11 +209,7 @@ async def test_a_late_answer_of_an_earlier_motion_says_nothing_about_a_later_one
 
 
 async def test_a_motion_is_refused_in_words(mesh, tmp_path, monkeypatch):
-    async with (
-        controller(monkeypatch) as (port, server),
-        movable(mesh, tmp_path, port) as (site, relay),
-    ):
-        await in_control(site)
+    async with commanded(mesh, tmp_path, monkeypatch) as (server, site, relay):
         arm, now = server.controller, time.monotonic
         for text, begin, end in (
             ("stopped", lambda: arm.switch_servos(False, now()), lambda: arm.switch_servos(True, now())),
