@@ -13,7 +13,6 @@ from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from services.console.websocket.framing import SampleBatch, batches, frame, state_frame
 from services.console.websocket.page_connection import PageConnection
 from services.console.websocket.write_scheduler import WriteScheduler
-from tests.conftest import run
 
 KEY, VIDEO = "robomesh/s/r/joints", "robomesh/s/r/video/top"
 DELTA = b"\0\0\0\1\x41\x9a\x01"
@@ -183,16 +182,13 @@ def test_a_write_is_small_and_in_order():
     assert list(batches([])) == []
 
 
-def test_an_error_in_one_page_does_not_delay_the_others(caplog):
-    async def main():
-        scheduler, served = WriteScheduler(), []
-        scheduler.schedule(lambda: 1 / 0)
-        scheduler.schedule(lambda: served.append(1))
-        await scheduler.wait_for_round()
-        assert served == [1]
-        await scheduler.wait_for_round()
-
-    run(main())
+async def test_an_error_in_one_page_does_not_delay_the_others(caplog):
+    scheduler, served = WriteScheduler(), []
+    scheduler.schedule(lambda: 1 / 0)
+    scheduler.schedule(lambda: served.append(1))
+    await scheduler.wait_for_round()
+    assert served == [1]
+    await scheduler.wait_for_round()
     assert "could not be served" in caplog.text
 
 

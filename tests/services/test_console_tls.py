@@ -12,7 +12,6 @@ import pytest
 
 from robomesh.errors import ListenError
 from services.console.serving import uvicorn_server
-from tests.conftest import run
 from tests.services.certificates import self_signed
 from tests.services.signing_in import accounts_file
 from tests.services.test_console import console, page
@@ -98,26 +97,22 @@ async def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_on
                 await asyncio.sleep(0.02)
 
 
-def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, tmp_path):
+async def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, tmp_path):
     certificate, key = self_signed(tmp_path)
     trusted = ssl.create_default_context(cafile=certificate)
-
-    async def main():
-        async with console(mesh, page, tls={"certificate": certificate, "key": key}) as (address, _):
-            here = address.removeprefix("https://")
-            headers = [("Origin", address), ("Connection", "Upgrade"), ("Upgrade", "websocket")]
-            headers += [("Sec-WebSocket-Version", 13), ("Sec-WebSocket-Key", "AAAAAAAAAAAAAAAAAAAAAA==")]
-            async with AsyncExitStack() as stack:
-                pages = [await stack.enter_async_context(connected(here, ssl=trusted)) for _ in range(10)]
-                for reader, writer in pages:
-                    writer.write(http("GET", "/mesh", here, headers))
-                    assert b" 101 " in await reader.readline()
-                # The ends come before the console has read all of the close frames.
-                for _, writer in pages:
-                    writer.write(CLOSE)
-                    writer.get_extra_info("socket").shutdown(socket.SHUT_WR)
-
-    run(main())
+    async with console(mesh, page, tls={"certificate": certificate, "key": key}) as (address, _):
+        here = address.removeprefix("https://")
+        headers = [("Origin", address), ("Connection", "Upgrade"), ("Upgrade", "websocket")]
+        headers += [("Sec-WebSocket-Version", 13), ("Sec-WebSocket-Key", "AAAAAAAAAAAAAAAAAAAAAA==")]
+        async with AsyncExitStack() as stack:
+            pages = [await stack.enter_async_context(connected(here, ssl=trusted)) for _ in range(10)]
+            for reader, writer in pages:
+                writer.write(http("GET", "/mesh", here, headers))
+                assert b" 101 " in await reader.readline()
+            # The ends come before the console has read all of the close frames.
+            for _, writer in pages:
+                writer.write(CLOSE)
+                writer.get_extra_info("socket").shutdown(socket.SHUT_WR)
     with warnings.catch_warnings(record=True) as unclosed:
         warnings.simplefilter("always", ResourceWarning)
         gc.collect()

@@ -178,53 +178,45 @@ async def stopped_workers(workshop, folder):
 
 
 @pytest.mark.slow
-def test_a_small_file_waits_for_no_slow_one(tmp_path):
+async def test_a_small_file_waits_for_no_slow_one(tmp_path):
     kept = store.open_store(tmp_path / "store")
     files = {"comb.wrl": store.put(kept, comb(teeth=100)), "box.wrl": store.put(kept, BOX)}
     folder = store.lay_out(kept, files)
-
-    async def main():
-        workshop = Workshop(kept.folder, Limits(slow_s=30.0))
-        try:
-            first, second = await stopped_workers(workshop, folder)
-            os.kill(second, signal.SIGCONT)
-            slow = asyncio.create_task(workshop.slow.run("mesh", folder, {"file": "comb.wrl"}))
-            await asyncio.sleep(0)
-            assert (await workshop.slow.run("mesh", folder, {"file": "box.wrl"}))["glb"]
-            assert not slow.done()
-            os.kill(first, signal.SIGCONT)
-            assert (await slow)["glb"]
-        finally:
-            await workshop.close()
-
-    run(main())
+    workshop = Workshop(kept.folder, Limits(slow_s=30.0))
+    try:
+        first, second = await stopped_workers(workshop, folder)
+        os.kill(second, signal.SIGCONT)
+        slow = asyncio.create_task(workshop.slow.run("mesh", folder, {"file": "comb.wrl"}))
+        await asyncio.sleep(0)
+        assert (await workshop.slow.run("mesh", folder, {"file": "box.wrl"}))["glb"]
+        assert not slow.done()
+        os.kill(first, signal.SIGCONT)
+        assert (await slow)["glb"]
+    finally:
+        await workshop.close()
 
 
 @pytest.mark.slow
-def test_two_slow_files_hold_up_no_third_asker_and_both_are_read(tmp_path):
+async def test_two_slow_files_hold_up_no_third_asker_and_both_are_read(tmp_path):
     kept = store.open_store(tmp_path / "store")
     files = {"comb.wrl": store.put(kept, comb(teeth=100)), "box.wrl": store.put(kept, BOX)}
     folder = store.lay_out(kept, files)
+    workshop = Workshop(kept.folder, Limits(slow_s=60.0, brief_s=5.0))
 
-    async def main():
-        workshop = Workshop(kept.folder, Limits(slow_s=60.0, brief_s=5.0))
+    def ask(asker, file):
+        return asyncio.create_task(workshop.slow.run("mesh", folder, {"file": file}, asker=asker))
 
-        def ask(asker, file):
-            return asyncio.create_task(workshop.slow.run("mesh", folder, {"file": file}, asker=asker))
-
-        try:
-            first, second = await stopped_workers(workshop, folder)
-            slow = [ask("one", "comb.wrl"), ask("two", "comb.wrl")]
-            more = [ask("two", "comb.wrl") for _ in range(3)]
-            assert (await ask("three", "box.wrl"))["glb"]
-            assert not alive(second)
-            assert not any(each.done() for each in slow)
-            os.kill(first, signal.SIGCONT)
-            assert all(each["glb"] for each in await asyncio.gather(*slow, *more))
-        finally:
-            await workshop.close()
-
-    run(main())
+    try:
+        first, second = await stopped_workers(workshop, folder)
+        slow = [ask("one", "comb.wrl"), ask("two", "comb.wrl")]
+        more = [ask("two", "comb.wrl") for _ in range(3)]
+        assert (await ask("three", "box.wrl"))["glb"]
+        assert not alive(second)
+        assert not any(each.done() for each in slow)
+        os.kill(first, signal.SIGCONT)
+        assert all(each["glb"] for each in await asyncio.gather(*slow, *more))
+    finally:
+        await workshop.close()
 
 
 def test_askers_take_turns(tmp_path):

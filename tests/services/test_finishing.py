@@ -11,7 +11,6 @@ import pytest
 from robomesh.recordings.writing.recover import State, state_of
 from services.recorder import finishing
 from services.recorder.finishing import Finisher, Job
-from tests.conftest import run
 from tests.robomesh.recordings.test_capture import write
 
 pytestmark = pytest.mark.slow
@@ -44,29 +43,25 @@ def worker_process():
     return None
 
 
-def test_job_of_a_killed_worker_fails_and_the_next_job_is_done(tmp_path):
+async def test_job_of_a_killed_worker_fails_and_the_next_job_is_done(tmp_path):
     first, second = tmp_path / "first.mcap", tmp_path / "second.mcap"
     write(first, range(100))
     write(second, range(100))
     before = second.read_bytes()
-
-    async def main():
-        async with serving() as finisher:
-            assert await submit(finisher, first) is None
-            assert state_of(first) is State.INDEXED
-            worker = worker_process()
-            worker.send_signal(signal.SIGSTOP)
-            killed = submit(finisher, second)
-            while not finisher._worker._turn.locked():
-                await asyncio.sleep(0)
-            os.kill(worker.pid, signal.SIGKILL)
-            assert "crashed (status -9)" in await killed
-            assert second.read_bytes() == before
-            assert await submit(finisher, second) is None
-            assert finisher.progress == {}
-        assert worker_process() is None
-
-    run(main(), timeout_s=120)
+    async with serving() as finisher:
+        assert await submit(finisher, first) is None
+        assert state_of(first) is State.INDEXED
+        worker = worker_process()
+        worker.send_signal(signal.SIGSTOP)
+        killed = submit(finisher, second)
+        while not finisher._worker._turn.locked():
+            await asyncio.sleep(0)
+        os.kill(worker.pid, signal.SIGKILL)
+        assert "crashed (status -9)" in await killed
+        assert second.read_bytes() == before
+        assert await submit(finisher, second) is None
+        assert finisher.progress == {}
+    assert worker_process() is None
     assert state_of(second) is State.INDEXED
 
 

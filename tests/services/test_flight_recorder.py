@@ -51,35 +51,31 @@ async def saved(folder):
     return path
 
 
-def test_an_event_saves_the_messages_before_and_after_it(mesh, tmp_path, monkeypatch):
+async def test_an_event_saves_the_messages_before_and_after_it(mesh, tmp_path, monkeypatch):
     # The test ends the save itself, because a busy machine may take any time.
     ended = threading.Event()
     monkeypatch.setattr(flight.FlightRecorder, "_is_too_long", lambda recorder, now: ended.is_set())
-
-    async def main():
-        async with recording_site(mesh, tmp_path, flight=Flight(after_s=600.0)) as session:
-            joints = session.declare_publisher("site", "arm", "joints")
-            events = session.declare_publisher("site", "arm", "events")
-            await until(lambda: joints.watched and events.watched)
-            await put_states(joints, range(50), hz=500)
-            events.put(event(S.WARNING, "not severe enough"))
-            events.put(event(S.ERROR, "drive 3 failed"))
-            await put_states(joints, range(50, 100), hz=500)
-            events.put(event(S.ERROR, "drive 4 failed"))
-            await put_states(joints, range(100, 120), hz=500)
-            while await joints_listed(session) < 120:
-                await asyncio.sleep(0.02)
-            ended.set()
-            path = await saved(tmp_path)
-            # A second save holds only later messages.
-            await put_states(joints, range(200, 210), hz=500)
-            answer = await session.ask(KEY, Ask(action=Ask.SAVE, name="by-hand"), timeout_s=WITHIN_S)
-            assert (answer.name, answer.cause, answer.open) == ("by-hand", "requested", True)
-            await until(lambda: (tmp_path / "arm" / answer.file).exists())
-            await until_indexed(tmp_path / "arm" / answer.file)
-            return path, tmp_path / "arm" / answer.file
-
-    path, by_hand = run(main(), timeout_s=60.0)
+    async with recording_site(mesh, tmp_path, flight=Flight(after_s=600.0)) as session:
+        joints = session.declare_publisher("site", "arm", "joints")
+        events = session.declare_publisher("site", "arm", "events")
+        await until(lambda: joints.watched and events.watched)
+        await put_states(joints, range(50), hz=500)
+        events.put(event(S.WARNING, "not severe enough"))
+        events.put(event(S.ERROR, "drive 3 failed"))
+        await put_states(joints, range(50, 100), hz=500)
+        events.put(event(S.ERROR, "drive 4 failed"))
+        await put_states(joints, range(100, 120), hz=500)
+        while await joints_listed(session) < 120:
+            await asyncio.sleep(0.02)
+        ended.set()
+        path = await saved(tmp_path)
+        # A second save holds only later messages.
+        await put_states(joints, range(200, 210), hz=500)
+        answer = await session.ask(KEY, Ask(action=Ask.SAVE, name="by-hand"), timeout_s=WITHIN_S)
+        assert (answer.name, answer.cause, answer.open) == ("by-hand", "requested", True)
+        await until(lambda: (tmp_path / "arm" / answer.file).exists())
+        await until_indexed(tmp_path / "arm" / answer.file)
+        path, by_hand = path, tmp_path / "arm" / answer.file
     assert positions(path) == list(range(120))
     assert positions(by_hand) == list(range(200, 210))
     recording = describe_file(path)
@@ -127,24 +123,19 @@ def segment_in(folder, number, *, end):
     return path
 
 
-def test_segments_of_a_killed_flight_recorder_are_saved_at_the_next_start(mesh, tmp_path):
+async def test_segments_of_a_killed_flight_recorder_are_saved_at_the_next_start(mesh, tmp_path):
     segment = segment_in(tmp_path, 1, end=False)
     unreadable = segment.with_name("2026-01-01T00-00-00.000000Z.mcap")
     unreadable.write_bytes(bytes(4096))  # like a power loss
-
-    async def main():
-        async with recording_site(mesh, tmp_path, flight=Flight()):
-            path = await saved(tmp_path)
-            await until(lambda: not segment.exists())
-            return path
-
-    path = run(main())
+    async with recording_site(mesh, tmp_path, flight=Flight()):
+        path = await saved(tmp_path)
+        await until(lambda: not segment.exists())
     assert "killed" in describe_file(path).cause
     assert positions(path) == [1]
     assert unreadable.with_suffix(".damaged").exists()
 
 
-def test_a_save_that_was_done_before_a_kill_is_not_repeated(mesh, tmp_path):
+async def test_a_save_that_was_done_before_a_kill_is_not_repeated(mesh, tmp_path):
     first, second = (segment_in(tmp_path, number, end=True) for number in (1, 2))
     (tmp_path / "arm").mkdir()
     rewrite([first, second], tmp_path / "arm" / "done.mcap", about={"name": "done"})
@@ -152,39 +143,31 @@ def test_a_save_that_was_done_before_a_kill_is_not_repeated(mesh, tmp_path):
     mark = first.with_name("done.save.json")
     mark.write_text(json.dumps(noted))
     first.unlink()  # the process was killed here
-
-    async def main():
-        async with recording_site(mesh, tmp_path, flight=Flight()) as session:
-            joints = session.declare_publisher("site", "arm", "joints")
-            await until(lambda: joints.watched)
-
-    run(main())
+    async with recording_site(mesh, tmp_path, flight=Flight()) as session:
+        joints = session.declare_publisher("site", "arm", "joints")
+        await until(lambda: joints.watched)
     assert not second.exists()
     assert not mark.exists()
     assert [path.name for path in tmp_path.glob(SAVED)] == ["done.mcap"]
 
 
-def test_a_failed_save_is_reported_and_retried(mesh, tmp_path, monkeypatch):
+async def test_a_failed_save_is_reported_and_retried(mesh, tmp_path, monkeypatch):
     monkeypatch.setattr(flight, "_SAVE_RETRY_S", 0.1)
     (tmp_path / "arm").write_bytes(b"")  # no folder can be made there
-
-    async def main():
-        async with recording_site(mesh, tmp_path, flight=Flight(after_s=0.0)) as session:
-            events = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
-            joints = session.declare_publisher("site", "arm", "joints")
-            await until(lambda: joints.watched)
-            await put_states(joints, range(5))
-            for name in ("shift/3", "x" * 300):
-                with refused(codes.RECORDING_NAME):
-                    await session.ask(KEY, Ask(action=Ask.SAVE, name=name), timeout_s=WITHIN_S)
-            await session.ask(KEY, Ask(action=Ask.SAVE, name="kept"), timeout_s=WITHIN_S)
-            failure = await next_event(events, "recorder.not_saved")
-            (tmp_path / "arm").unlink()
-            path = await saved(tmp_path)
-            await next_event(events, "recorder.saved")
-            return failure, path
-
-    failure, path = run(main(), timeout_s=60.0)
+    async with recording_site(mesh, tmp_path, flight=Flight(after_s=0.0)) as session:
+        events = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
+        joints = session.declare_publisher("site", "arm", "joints")
+        await until(lambda: joints.watched)
+        await put_states(joints, range(5))
+        for name in ("shift/3", "x" * 300):
+            with refused(codes.RECORDING_NAME):
+                await session.ask(KEY, Ask(action=Ask.SAVE, name=name), timeout_s=WITHIN_S)
+        await session.ask(KEY, Ask(action=Ask.SAVE, name="kept"), timeout_s=WITHIN_S)
+        failure = await next_event(events, "recorder.not_saved")
+        (tmp_path / "arm").unlink()
+        path = await saved(tmp_path)
+        await next_event(events, "recorder.saved")
+        failure, path = failure, path
     assert failure.severity == S.CRITICAL
     assert "kept is not saved" in failure.text
     assert positions(path) == list(range(5))

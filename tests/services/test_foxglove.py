@@ -18,7 +18,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
 from services.foxglove.server import serve
 from services.foxglove.settings import Settings
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 from tests.protocol_gateway.gateway_site import STATE, gateway, simulator
 from tests.services.foxglove_client import attached
 
@@ -319,27 +319,24 @@ async def test_names_that_are_invalid_in_keys_are_ignored(mesh):
         token.undeclare()
 
 
-def test_states_arrive_again_after_a_routers_restart():
-    async def main():
-        endpoint = mesh.connect[0]
-        router = zenoh.open(router_config((endpoint,)))
-        try:
-            async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
-                states = robot.declare_publisher("hall", "arm", "joints")
-                await client.subscribe(f"{ARM}/joints")
-                await client.until(lambda: states.watched)
-                states.put(joints(1.0))
-                await client.first(f"{ARM}/joints")
-                await asyncio.to_thread(router.close)
-                await client.until(lambda: not robot.connected)
-                router = zenoh.open(router_config((endpoint,)))
-                got, before = client.got[f"{ARM}/joints"], len(client.got[f"{ARM}/joints"])
-                async with asyncio.timeout(60):
-                    while len(got) == before:
-                        states.put(joints(2.0))
-                        await asyncio.sleep(0.05)
-        finally:
-            await asyncio.to_thread(router.close)
-
+async def test_states_arrive_again_after_a_routers_restart():
     mesh = SessionSettings(connect=(f"tcp/127.0.0.1:{free_port()}",), wait_s=5.0)
-    run(main(), timeout_s=90.0)
+    endpoint = mesh.connect[0]
+    router = zenoh.open(router_config((endpoint,)))
+    try:
+        async with robot_session(mesh) as robot, bridge(mesh) as address, attached(address) as client:
+            states = robot.declare_publisher("hall", "arm", "joints")
+            await client.subscribe(f"{ARM}/joints")
+            await client.until(lambda: states.watched)
+            states.put(joints(1.0))
+            await client.first(f"{ARM}/joints")
+            await asyncio.to_thread(router.close)
+            await client.until(lambda: not robot.connected)
+            router = zenoh.open(router_config((endpoint,)))
+            got, before = client.got[f"{ARM}/joints"], len(client.got[f"{ARM}/joints"])
+            async with asyncio.timeout(60):
+                while len(got) == before:
+                    states.put(joints(2.0))
+                    await asyncio.sleep(0.05)
+    finally:
+        await asyncio.to_thread(router.close)

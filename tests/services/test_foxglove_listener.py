@@ -13,7 +13,6 @@ from robomesh.errors import ListenError
 from services.foxglove import listener
 from services.foxglove.listener import Listener, is_allowed_origin
 from services.foxglove.settings import ORIGINS
-from tests.conftest import run
 from tests.services.foxglove_client import attached
 from tests.services.test_foxglove import ARM, bridge, robot_session
 
@@ -151,16 +150,13 @@ async def test_a_client_that_disconnects_makes_room_for_another(monkeypatch):
             writer.close()
 
 
-def test_a_closed_listener_ends_its_connections_without_an_error(caplog):
-    async def main():
-        proxy = Listener("127.0.0.1", 1, ())
-        async with proxy.open("127.0.0.1", 0, None) as port:
-            reader, writer = await asyncio.open_connection("127.0.0.1", port)
-            while not proxy._per_address:
-                await asyncio.sleep(0.01)
-        assert not proxy._per_address
-        assert await reader.read() == b""
-        writer.close()
-
-    run(main())
+async def test_a_closed_listener_ends_its_connections_without_an_error(caplog):
+    proxy = Listener("127.0.0.1", 1, ())
+    async with proxy.open("127.0.0.1", 0, None) as port:
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        while not proxy._per_address:
+            await asyncio.sleep(0.01)
+    assert not proxy._per_address
+    assert await reader.read() == b""
+    writer.close()
     assert not [record for record in caplog.records if record.name == "asyncio"]

@@ -53,21 +53,17 @@ def test_a_returned_site_is_not_gone():
     assert not gone_sites([schema.AlarmList(site="a", alarms=[gone(state=Alarm.RETURNED)])])
 
 
-def test_a_robots_row_has_what_its_driver_can_do(mesh):
+async def test_a_robots_row_has_what_its_driver_can_do(mesh):
     state = schema.ControllerState(link=schema.ControllerState.UP)
     can = state.capabilities
     can.stops, can.absolute = schema.Capabilities.OURS, True
     can.dies_with_link = schema.ControllerState.NO
     can.recoveries.extend([schema.Recover.POWER_ON, schema.Recover.BRAKE_RELEASE])
-
-    async def main():
-        async with open_session(mesh) as gateway, open_session(mesh) as monitor:
-            gateway.declare_publisher("hall", "arm", "controller").put(state)
-            while (await listing._row(monitor, "hall", "arm", gateway=True))["link"] != "up":
-                await asyncio.sleep(0.02)
-            return [await listing._row(monitor, "hall", name, gateway=False) for name in ("arm", "other")]
-
-    arm, other = run(main())
+    async with open_session(mesh) as gateway, open_session(mesh) as monitor:
+        gateway.declare_publisher("hall", "arm", "controller").put(state)
+        while (await listing._row(monitor, "hall", "arm", gateway=True))["link"] != "up":
+            await asyncio.sleep(0.02)
+        arm, other = [await listing._row(monitor, "hall", name, gateway=False) for name in ("arm", "other")]
     keys = ("stops", "commands", "absolute", "dies_with_link", "recoveries")
     assert [arm[key] for key in keys] == ["ours", [], True, False, ["power_on", "brake_release"]]
     assert [other[key] for key in keys] == [None, [], None, None, []]
@@ -95,21 +91,17 @@ def test_a_gateway_that_answers_late_is_not_called_missing(mesh, monkeypatch):
     assert run(main()) == {"arm": "down", "mute": "no answer", "other": "no gateway"}
 
 
-def test_a_list_that_leaves_out_sessions_says_that_it_is_partial(mesh, capsys):
-    async def main():
-        async with open_session(mesh) as eve, open_session(mesh) as monitor:
-            eve.declare_presence("hall", "arm", "gateway")
-            names = [f"eve.{number}" for number in range(100)]
-            tokens = [eve.declare_presence_of("hall", "arm", "operator", name) for name in names]
-            while True:
-                found = await listing._collect(monitor, listing._Clocks())
-                if len(found["services"]) == 1 + 64:
-                    break
-            for token in tokens:
-                token.undeclare()
-            return found
-
-    found = run(main())
+async def test_a_list_that_leaves_out_sessions_says_that_it_is_partial(mesh, capsys):
+    async with open_session(mesh) as eve, open_session(mesh) as monitor:
+        eve.declare_presence("hall", "arm", "gateway")
+        names = [f"eve.{number}" for number in range(100)]
+        tokens = [eve.declare_presence_of("hall", "arm", "operator", name) for name in names]
+        while True:
+            found = await listing._collect(monitor, listing._Clocks())
+            if len(found["services"]) == 1 + 64:
+                break
+        for token in tokens:
+            token.undeclare()
     assert (found["partial"], [row["robot"] for row in found["robots"]]) == (True, ["arm"])
     Console(width=200).print(listing_text.listing_text(found, 200))
     assert "This list is partial" in capsys.readouterr().out
@@ -142,19 +134,16 @@ def test_an_ambiguous_alarm_name_is_refused_with_the_candidates():
         alarms._by_site(["nothing"], [both])
 
 
-def test_acknowledging_names_the_alarms_that_it_acknowledged(mesh, capsys):
-    async def main():
-        async with open_session(mesh) as watch, open_session(mesh) as monitor:
-            watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
-            watch.answer("shanghai", "-", "alarms/request/*", acknowledge)
-            while not await lists(monitor):
-                await asyncio.sleep(0.02)
-            await asyncio.to_thread(alarms.ack, ["link.down"], mesh.connect[0], "li")
-
+async def test_acknowledging_names_the_alarms_that_it_acknowledged(mesh, capsys):
     async def acknowledge(_):
         return schema.AlarmList(site="shanghai")
 
-    run(main())
+    async with open_session(mesh) as watch, open_session(mesh) as monitor:
+        watch.declare_publisher("shanghai", "-", "alarms").put(SHANGHAI)
+        watch.answer("shanghai", "-", "alarms/request/*", acknowledge)
+        while not await lists(monitor):
+            await asyncio.sleep(0.02)
+        await asyncio.to_thread(alarms.ack, ["link.down"], mesh.connect[0], "li")
     first, *_ = capsys.readouterr().out.splitlines()
     assert first == "acknowledged: shanghai/arm:link"
 

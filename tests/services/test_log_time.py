@@ -78,26 +78,23 @@ def test_a_slowly_created_file_dates_no_message_before_its_publication(mesh, tmp
     assert min(message.log_time - message.publish_time for message in messages) >= 0
 
 
-def test_setting_the_clock_forward_begins_the_next_file(mesh, tmp_path, monkeypatch):
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            joints = session.declare_publisher("site", "arm", "joints")
-            first = await trace_on(session, name="trial")
-            await until(lambda: joints.watched)
-            await put_states(joints, range(20))
-            real = time.time_ns
-            monkeypatch.setattr(time, "time_ns", lambda: real() + 3600 * 10**9)
-            set_ns, paths = time.time_ns(), []
-            while len(paths) < 2:
-                await put_states(joints, range(5))
-                paths = sorted((tmp_path / "arm").glob("*_trial*.mcap"), key=lambda path: path.stat().st_ino)
-            await put_states(joints, range(20))
-            await trace_off(session)
-            (second,) = (path for path in paths if path.name != first.file)
-            await until_indexed(second)
-            return second, set_ns
-
-    second, set_ns = run(main(), timeout_s=60)
+async def test_setting_the_clock_forward_begins_the_next_file(mesh, tmp_path, monkeypatch):
+    async with recording_site(mesh, tmp_path) as session:
+        joints = session.declare_publisher("site", "arm", "joints")
+        first = await trace_on(session, name="trial")
+        await until(lambda: joints.watched)
+        await put_states(joints, range(20))
+        real = time.time_ns
+        monkeypatch.setattr(time, "time_ns", lambda: real() + 3600 * 10**9)
+        set_ns, paths = time.time_ns(), []
+        while len(paths) < 2:
+            await put_states(joints, range(5))
+            paths = sorted((tmp_path / "arm").glob("*_trial*.mcap"), key=lambda path: path.stat().st_ino)
+        await put_states(joints, range(20))
+        await trace_off(session)
+        (second,) = (path for path in paths if path.name != first.file)
+        await until_indexed(second)
+        second, set_ns = second, set_ns
     assert ".part2" in second.name
     messages = [message for message in messages_of(second) if message.publish_time >= set_ns]
     assert len(messages) >= 15  # the request may overtake the last states

@@ -22,7 +22,6 @@ from services.command_line.watch.monitor_text import (
     program_record,
     program_words,
 )
-from tests.conftest import run
 from tests.robomesh.test_session import joints
 
 ARM = Description(warning_distance=0.05, stop_distance=0.01)
@@ -111,18 +110,15 @@ def test_json_has_clearance_and_program_or_null():
     assert program_record(None) is None
 
 
-def test_a_count_is_of_live_states_only(mesh, capsys):
-    async def main():
-        async with open_session(mesh) as gateway:
-            gateway.declare_presence("hall", "arm", "gateway")
-            publisher = gateway.declare_publisher("hall", "arm", "joints")
-            publisher.put(joints(1.0))
-            watching = asyncio.create_task(monitor._json("hall/arm", mesh.connect[0], 2))
-            while not watching.done():
-                publisher.put(joints(2.0))
-                await asyncio.sleep(0.05)
-            await watching
-
-    run(main())
+async def test_a_count_is_of_live_states_only(mesh, capsys):
+    async with open_session(mesh) as gateway:
+        gateway.declare_presence("hall", "arm", "gateway")
+        publisher = gateway.declare_publisher("hall", "arm", "joints")
+        publisher.put(joints(1.0))
+        watching = asyncio.create_task(monitor._json("hall/arm", mesh.connect[0], 2))
+        while not watching.done():
+            publisher.put(joints(2.0))
+            await asyncio.sleep(0.05)
+        await watching
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [row["live"] for row in rows] == [True, True]

@@ -21,7 +21,6 @@ from services.console.accounts.rights import check_right, parse_request
 from services.console.accounts.sessions import SignedIn
 from services.store import notes as notes_module
 from services.store.notes import LONGEST_TEXT, NoteBook
-from tests.conftest import run
 from tests.refusals import refused
 from tests.services.recording import recording_site, trace_off, trace_on
 from tests.services.test_store import stored
@@ -225,19 +224,15 @@ async def test_notes_have_a_quota_and_known_robots_only(mesh, tmp_path):
                     await sent
 
 
-def test_another_reader_finds_the_note_in_a_running_recording(mesh, tmp_path):
-    async def main():
-        folder = tmp_path / "store"
-        async with recording_site(mesh, tmp_path) as page, stored(mesh, folder, site="site"):
-            await trace_on(page)
-            async with attached(mesh, "site") as robot:
-                note = await robot.note("gripper slips", author="li")
-            while EVENTS not in {each.topic for each in (await page.last(RECORDING)).topics}:
-                await asyncio.sleep(0.05)
-            await trace_off(page)
-            return note
-
-    note = run(main(), timeout_s=60)
+async def test_another_reader_finds_the_note_in_a_running_recording(mesh, tmp_path):
+    folder = tmp_path / "store"
+    async with recording_site(mesh, tmp_path) as page, stored(mesh, folder, site="site"):
+        await trace_on(page)
+        async with attached(mesh, "site") as robot:
+            note = await robot.note("gripper slips", author="li")
+        while EVENTS not in {each.topic for each in (await page.last(RECORDING)).topics}:
+            await asyncio.sleep(0.05)
+        await trace_off(page)
     (path,) = tmp_path.rglob("*.mcap")
     with path.open("rb") as stream:
         reader = mcap.reader.make_reader(stream, decoder_factories=[DecoderFactory()])

@@ -65,24 +65,21 @@ def waist(sample):
     return {joint.name: joint.position for joint in sample.message().joints}["waist"]
 
 
-def test_a_monitor_receives_each_recorded_state_once_with_its_recorded_time(mesh, folder):
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            state = await opened(session, paused=True)
-            seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=1000)
-            frames = session.subscribe(f"robomesh/site/{state.robot}/frames", newest=1000)
-            await ask(session, state, _Ask.PLAY)
-            ended = await until_state(session, state, lambda state: state.position_s == state.duration_s)
-            assert not ended.playing
-            samples = []
-            async with asyncio.timeout(40):
-                async for sample in seen:
-                    samples.append(sample)
-                    if waist(sample) > 3.985:
-                        break
-            return samples, (await anext(frames)).message()
-
-    samples, frames = run(main())
+async def test_a_monitor_receives_each_recorded_state_once_with_its_recorded_time(mesh, folder):
+    async with playing_site(mesh, folder) as session:
+        state = await opened(session, paused=True)
+        seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=1000)
+        frames = session.subscribe(f"robomesh/site/{state.robot}/frames", newest=1000)
+        await ask(session, state, _Ask.PLAY)
+        ended = await until_state(session, state, lambda state: state.position_s == state.duration_s)
+        assert not ended.playing
+        samples = []
+        async with asyncio.timeout(40):
+            async for sample in seen:
+                samples.append(sample)
+                if waist(sample) > 3.985:
+                    break
+        samples, frames = samples, (await anext(frames)).message()
     # The first state was published before the subscription, and is its history.
     received = {sample.header.source_time_ns: waist(sample) for sample in samples}
     assert received == {START_NS + number * 10_000_000 - 1000: number / 100 for number in range(400)}
@@ -91,57 +88,51 @@ def test_a_monitor_receives_each_recorded_state_once_with_its_recorded_time(mesh
     assert frames.transforms[0].parent_frame_id == "site"
 
 
-def test_a_recorders_file_is_replayed_unchanged(mesh, tmp_path):
-    async def main():
-        async with playing_site(mesh, tmp_path) as session, open_session(mesh) as service:
-            settings = recorder.Settings(site="site", robots=("arm",), folder=tmp_path)
-            recording = asyncio.create_task(recorder.serve(service, settings))
-            key = "robomesh/site/arm/recorder/request"
-            publisher = session.declare_publisher("site", "arm", "joints")
-            await session.ask(key, _Record(action=_Record.TRACE_ON, name="real", views=["-"]), timeout_s=15.0)
-            while not publisher.watched:
-                await asyncio.sleep(0.01)
-            put = {}
-            for number in range(50):
-                header = publisher.put(joints(waist=number / 7))
-                put[header.source_time_ns] = number / 7
-                await asyncio.sleep(0.01)
-            done = await session.ask(key, _Record(action=_Record.TRACE_OFF), timeout_s=15.0)
-            # In a loop, because a player that is late on a busy machine skips messages.
-            request = schema.PlayRequest(file=done.file, paused=True, loop=True)
-            state = await session.ask(OPEN, request, timeout_s=10.0)
-            seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=1000)
-            await ask(session, state, _Ask.PLAY)
-            played = {}
-            # Of the messages before the recording only the newest is replayed.
-            begin_ns = state.start.ToNanoseconds()
-            while {time_ns for time_ns in put if time_ns > begin_ns} - played.keys():
-                sample = await anext(seen)
-                played[sample.header.source_time_ns] = waist(sample)
-            recording.cancel()
-            await asyncio.gather(recording, return_exceptions=True)
-            return put, played
-
-    put, played = run(main(), timeout_s=60.0)
+async def test_a_recorders_file_is_replayed_unchanged(mesh, tmp_path):
+    async with playing_site(mesh, tmp_path) as session, open_session(mesh) as service:
+        settings = recorder.Settings(site="site", robots=("arm",), folder=tmp_path)
+        recording = asyncio.create_task(recorder.serve(service, settings))
+        key = "robomesh/site/arm/recorder/request"
+        publisher = session.declare_publisher("site", "arm", "joints")
+        await session.ask(key, _Record(action=_Record.TRACE_ON, name="real", views=["-"]), timeout_s=15.0)
+        while not publisher.watched:
+            await asyncio.sleep(0.01)
+        put = {}
+        for number in range(50):
+            header = publisher.put(joints(waist=number / 7))
+            put[header.source_time_ns] = number / 7
+            await asyncio.sleep(0.01)
+        done = await session.ask(key, _Record(action=_Record.TRACE_OFF), timeout_s=15.0)
+        # In a loop, because a player that is late on a busy machine skips messages.
+        request = schema.PlayRequest(file=done.file, paused=True, loop=True)
+        state = await session.ask(OPEN, request, timeout_s=10.0)
+        seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=1000)
+        await ask(session, state, _Ask.PLAY)
+        played = {}
+        # Of the messages before the recording only the newest is replayed.
+        begin_ns = state.start.ToNanoseconds()
+        while {time_ns for time_ns in put if time_ns > begin_ns} - played.keys():
+            sample = await anext(seen)
+            played[sample.header.source_time_ns] = waist(sample)
+        recording.cancel()
+        await asyncio.gather(recording, return_exceptions=True)
+        put, played = put, played
     assert len(played) > 1
     assert played.items() <= put.items()
 
 
-def test_a_late_joiner_gets_the_replays_description_events_and_shapes(mesh, folder):
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            state = await opened(session, paused=True, position_s=2.5)
-            robot = f"robomesh/site/{state.robot}"
-            description = await last_value(session, f"{robot}/description")
-            events = await last_value(session, f"{robot}/events")
-            shape_bytes = await session.ask_bytes(f"{robot}/mesh/base")
-            with refused(codes.RECORDING_NO_ATTACHMENT, name="mesh/none", attachments="mesh/base"):
-                await session.ask_bytes(f"{robot}/mesh/none", timeout_s=8.0)
-            alive = {(each.robot, each.service) for each in await session.present()}
-            assert (state.robot, "player") in alive
-            return state, description, events, shape_bytes
-
-    state, description, events, shape_bytes = run(main())
+async def test_a_late_joiner_gets_the_replays_description_events_and_shapes(mesh, folder):
+    async with playing_site(mesh, folder) as session:
+        state = await opened(session, paused=True, position_s=2.5)
+        robot = f"robomesh/site/{state.robot}"
+        description = await last_value(session, f"{robot}/description")
+        events = await last_value(session, f"{robot}/events")
+        shape_bytes = await session.ask_bytes(f"{robot}/mesh/base")
+        with refused(codes.RECORDING_NO_ATTACHMENT, name="mesh/none", attachments="mesh/base"):
+            await session.ask_bytes(f"{robot}/mesh/none", timeout_s=8.0)
+        alive = {(each.robot, each.service) for each in await session.present()}
+        assert (state.robot, "player") in alive
+        state, description, events, shape_bytes = state, description, events, shape_bytes
     assert (description.title, description.cell) == ("Pt600", "")
     assert f"replay-{description.replay.id}" == state.robot
     assert (description.replay.robot, description.replay.file) == ("arm", "trial.mcap")
@@ -150,26 +141,23 @@ def test_a_late_joiner_gets_the_replays_description_events_and_shapes(mesh, fold
     assert state.duration_s == pytest.approx(3.99)
 
 
-def test_a_seek_publishes_the_state_then_and_video_since_the_key_frame(mesh, folder):
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            state = await opened(session, paused=True)
-            robot = f"robomesh/site/{state.robot}"
-            await ask(session, state, _Ask.SEEK, position_s=3.204)
-            async with asyncio.timeout(40):
-                while (message := await last_value(session, f"{robot}/joints")).joints[0].position != 3.2:
-                    await asyncio.sleep(0.02)
-            video = await last_value(session, f"{robot}/video/recorded-front")
-            events = await last_value(session, f"{robot}/events")
-            await ask(session, state, _Ask.SEEK, position_s=1.0)
-            async with asyncio.timeout(40):
-                while len((await last_value(session, f"{robot}/events")).events) > 2:
-                    await asyncio.sleep(0.02)
-            with refused(codes.REPLAY_POSITION, seconds="99", most="3.990"):
-                await ask(session, state, _Ask.SEEK, position_s=99)
-            return message, video, events
-
-    message, video, events = run(main())
+async def test_a_seek_publishes_the_state_then_and_video_since_the_key_frame(mesh, folder):
+    async with playing_site(mesh, folder) as session:
+        state = await opened(session, paused=True)
+        robot = f"robomesh/site/{state.robot}"
+        await ask(session, state, _Ask.SEEK, position_s=3.204)
+        async with asyncio.timeout(40):
+            while (message := await last_value(session, f"{robot}/joints")).joints[0].position != 3.2:
+                await asyncio.sleep(0.02)
+        video = await last_value(session, f"{robot}/video/recorded-front")
+        events = await last_value(session, f"{robot}/events")
+        await ask(session, state, _Ask.SEEK, position_s=1.0)
+        async with asyncio.timeout(40):
+            while len((await last_value(session, f"{robot}/events")).events) > 2:
+                await asyncio.sleep(0.02)
+        with refused(codes.REPLAY_POSITION, seconds="99", most="3.990"):
+            await ask(session, state, _Ask.SEEK, position_s=99)
+        message, video, events = message, video, events
     assert [joint.position for joint in message.joints] == [3.2, -3.2]
     assert len(events.events) == 4
     # Each fifth state has a frame, each fiftieth a key frame: 300, 305, 310, 315, 320.
@@ -178,41 +166,34 @@ def test_a_seek_publishes_the_state_then_and_video_since_the_key_frame(mesh, fol
     assert [picture.data[-3:] for picture in pictures] == [b"300", b"305", b"310", b"315", b"320"]
 
 
-def test_a_paused_replay_repeats_its_state_so_that_it_does_not_expire(mesh, folder):
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            state = await opened(session, paused=True, position_s=1.0)
-            seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=100, history=False)
-            samples = [await anext(seen) for _ in range(3)]
-            assert {waist(sample) for sample in samples} == {1.0}
-            assert samples[2].received - samples[1].received < 1.0
-            return await until_state(session, state, lambda state: True)
-
-    state = run(main())
+async def test_a_paused_replay_repeats_its_state_so_that_it_does_not_expire(mesh, folder):
+    async with playing_site(mesh, folder) as session:
+        state = await opened(session, paused=True, position_s=1.0)
+        seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=100, history=False)
+        samples = [await anext(seen) for _ in range(3)]
+        assert {waist(sample) for sample in samples} == {1.0}
+        assert samples[2].received - samples[1].received < 1.0
+        state = await until_state(session, state, lambda state: True)
     assert (state.playing, state.position_s) == (False, 1.0)
 
 
-def test_a_replay_at_a_hundred_times_the_speed_is_thinned_and_on_time(mesh, tmp_path):
+async def test_a_replay_at_a_hundred_times_the_speed_is_thinned_and_on_time(mesh, tmp_path):
     write_recording(tmp_path / "trial.mcap", seconds=60.0, video=False)
-
-    async def main():
-        async with playing_site(mesh, tmp_path) as session:
-            state = await opened(session, paused=True)
-            seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=10_000, history=False)
-            await ask(session, state, _Ask.SPEED, speed=100.0)
-            began = time.monotonic()
-            await ask(session, state, _Ask.PLAY)
-            await until_state(session, state, lambda state: state.position_s == state.duration_s)
-            took_s = time.monotonic() - began
-            count = 0
-            async with asyncio.timeout(40):
-                async for sample in seen:
-                    count += 1
-                    if waist(sample) > 59:
-                        break
-            return took_s, count
-
-    took_s, count = run(main())
+    async with playing_site(mesh, tmp_path) as session:
+        state = await opened(session, paused=True)
+        seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=10_000, history=False)
+        await ask(session, state, _Ask.SPEED, speed=100.0)
+        began = time.monotonic()
+        await ask(session, state, _Ask.PLAY)
+        await until_state(session, state, lambda state: state.position_s == state.duration_s)
+        took_s = time.monotonic() - began
+        count = 0
+        async with asyncio.timeout(40):
+            async for sample in seen:
+                count += 1
+                if waist(sample) > 59:
+                    break
+        took_s, count = took_s, count
     assert took_s >= 0.59
     assert count < 120  # of 6000; a slow machine skips messages and is not late
 
@@ -328,19 +309,16 @@ def test_a_recording_of_one_moment_is_not_looped(mesh, tmp_path):
     assert run(main()) == 0.0
 
 
-def test_the_terminal_monitor_marks_a_replay(mesh, router, folder, capsys):
-    async def main():
-        async with playing_site(mesh, folder) as session:
-            state = await opened(session, position_s=1.0, loop=True)
-            await asyncio.to_thread(monitor.monitor, state.robot, router, True, 2)
-            line = json.loads(capsys.readouterr().out.splitlines()[-1])
-            await monitor._live(state.robot, router, 2)
-            screen = capsys.readouterr().out
-            await asyncio.to_thread(listing.list_, router, False)
-            assert f"site/{state.robot}   replay of site/arm, " in capsys.readouterr().out
-            return line, screen
-
-    line, screen = run(main())
+async def test_the_terminal_monitor_marks_a_replay(mesh, router, folder, capsys):
+    async with playing_site(mesh, folder) as session:
+        state = await opened(session, position_s=1.0, loop=True)
+        await asyncio.to_thread(monitor.monitor, state.robot, router, True, 2)
+        line = json.loads(capsys.readouterr().out.splitlines()[-1])
+        await monitor._live(state.robot, router, 2)
+        screen = capsys.readouterr().out
+        await asyncio.to_thread(listing.list_, router, False)
+        assert f"site/{state.robot}   replay of site/arm, " in capsys.readouterr().out
+        line, screen = line, screen
     assert (line["live"], line["control"]) == (False, None)
     assert line["replay"]["of"] == "site/arm"
     assert line["replay"]["recorded"].startswith(recorded_day())

@@ -36,17 +36,14 @@ async def until_printed(capsys, text):
         await asyncio.sleep(0.02)
 
 
-def test_ctrl_c_ends_a_recording_and_prints_a_summary(mesh, router, tmp_path, capsys):
-    async def main():
-        async with arm_recorded(mesh, tmp_path) as other:
-            recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
-            await until_printed(capsys, "recording site/arm as trial; Ctrl-C ends it")
-            while not await joined(other, RobotAddress("site", "arm")):
-                pass
-            os.kill(os.getpid(), signal.SIGINT)
-            return await recording
-
-    done = run(main())
+async def test_ctrl_c_ends_a_recording_and_prints_a_summary(mesh, router, tmp_path, capsys):
+    async with arm_recorded(mesh, tmp_path) as other:
+        recording = asyncio.create_task(_record("arm", "trial", ["-"], router))
+        await until_printed(capsys, "recording site/arm as trial; Ctrl-C ends it")
+        while not await joined(other, RobotAddress("site", "arm")):
+            pass
+        os.kill(os.getpid(), signal.SIGINT)
+        done = await recording
     assert (done.recording.name, done.problem) == ("trial", "")
     assert (tmp_path / "arm" / done.recording.file).is_file()
 

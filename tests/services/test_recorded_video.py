@@ -73,24 +73,20 @@ def test_a_recording_without_a_description_fails_with_its_reason_and_leaves_no_f
 
 
 @pytest.mark.slow
-def test_a_page_that_leaves_ends_the_process_and_its_files(videos, monkeypatch, tmp_path):
+async def test_a_page_that_leaves_ends_the_process_and_its_files(videos, monkeypatch, tmp_path):
     pid = tmp_path / "pid"
     (tmp_path / "slow_render.py").write_text(SLOW.format(pid=str(pid)))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setattr(recorded_video, "_MODULE", "slow_render")
-
-    async def main():
-        request = asyncio.create_task(_Http(videos.app).request(URL, method="POST"))
-        while not pid.exists() or not pid.read_text():
-            await asyncio.sleep(0.02)
-        assert len(files(videos.place)) == 2
-        request.cancel()
-        await asyncio.gather(request, return_exceptions=True)
-        while files(videos.place) or is_running(pid):
-            await asyncio.sleep(0.02)
-        await videos.made.close()
-
-    run(main())
+    request = asyncio.create_task(_Http(videos.app).request(URL, method="POST"))
+    while not pid.exists() or not pid.read_text():
+        await asyncio.sleep(0.02)
+    assert len(files(videos.place)) == 2
+    request.cancel()
+    await asyncio.gather(request, return_exceptions=True)
+    while files(videos.place) or is_running(pid):
+        await asyncio.sleep(0.02)
+    await videos.made.close()
     assert not list(videos.place.iterdir())
 
 

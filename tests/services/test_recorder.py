@@ -52,22 +52,18 @@ async def until_watched(publisher):
         await asyncio.sleep(0.01)
 
 
-def test_a_capture_holds_every_message_with_the_foxglove_schemas(mesh, tmp_path):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, publisher):
-            begun = await trace_on(session, name="trial")
-            assert (begun.name, begun.open) == ("trial", True)
-            await until_watched(publisher)
-            await put_states(publisher, range(100))
-            done = await trace_off(session)
-            listed = await session.ask(LIST, timeout_s=20.0)
-            assert [(row.name, row.open, row.problem) for row in listed.recordings] == [("trial", False, "")]
-            file = tmp_path / "arm" / done.file
-            while chunk_count(file) == 0:  # indexed in the background
-                await asyncio.sleep(0.02)
-            return file
-
-    file = run(main())
+async def test_a_capture_holds_every_message_with_the_foxglove_schemas(mesh, tmp_path):
+    async with recording_arm(mesh, tmp_path) as (session, publisher):
+        begun = await trace_on(session, name="trial")
+        assert (begun.name, begun.open) == ("trial", True)
+        await until_watched(publisher)
+        await put_states(publisher, range(100))
+        done = await trace_off(session)
+        listed = await session.ask(LIST, timeout_s=20.0)
+        assert [(row.name, row.open, row.problem) for row in listed.recordings] == [("trial", False, "")]
+        file = tmp_path / "arm" / done.file
+        while chunk_count(file) == 0:  # indexed in the background
+            await asyncio.sleep(0.02)
     with file.open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         assert reader.get_summary().statistics.chunk_count > 0
@@ -81,33 +77,29 @@ def test_a_capture_holds_every_message_with_the_foxglove_schemas(mesh, tmp_path)
     assert all(topic.startswith("robomesh/site/arm/") for _, topic, _ in rows)
 
 
-def test_events_of_each_service_and_program_progress_are_recorded(mesh, tmp_path):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, publisher):
-            program = session.declare_publisher("site", "arm", "program")
-            events = {
-                name: session.declare_publisher("site", "arm", name)
-                for name in ("events", "events/kinematics")
-            }
-            events["events/kinematics"].put(schema.Event(code="before"))
-            await trace_on(session)
-            for watched in (publisher, program):
-                await until_watched(watched)
-            program.put(schema.ProgramState(name="weld", line=3))
-            for name, each in events.items():
-                each.put(schema.Event(code=f"of {name}"))
-            keys = {f"robomesh/site/arm/{name}" for name in ("program", *events)}
-            async with asyncio.timeout(40):
-                while not keys <= {row.topic for row in await recorded(session)}:
-                    await asyncio.sleep(0.02)
-            done = await trace_off(session)
-            return tmp_path / "arm" / done.file
-
+async def test_events_of_each_service_and_program_progress_are_recorded(mesh, tmp_path):
     async def recorded(session):
         (recording,) = (await session.ask(LIST, timeout_s=20.0)).recordings
         return recording.topics
 
-    file = run(main())
+    async with recording_arm(mesh, tmp_path) as (session, publisher):
+        program = session.declare_publisher("site", "arm", "program")
+        events = {
+            name: session.declare_publisher("site", "arm", name) for name in ("events", "events/kinematics")
+        }
+        events["events/kinematics"].put(schema.Event(code="before"))
+        await trace_on(session)
+        for watched in (publisher, program):
+            await until_watched(watched)
+        program.put(schema.ProgramState(name="weld", line=3))
+        for name, each in events.items():
+            each.put(schema.Event(code=f"of {name}"))
+        keys = {f"robomesh/site/arm/{name}" for name in ("program", *events)}
+        async with asyncio.timeout(40):
+            while not keys <= {row.topic for row in await recorded(session)}:
+                await asyncio.sleep(0.02)
+        done = await trace_off(session)
+        file = tmp_path / "arm" / done.file
     assert all(row.lost == 0 for row in describe_file(file).topics)
     with file.open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
@@ -132,41 +124,35 @@ def test_lost_publications_are_counted_in_the_file(mesh, tmp_path):
     assert (joints.messages, joints.lost) == (6, 7)
 
 
-def test_a_controllers_trace_opens_and_closes_a_capture(mesh, tmp_path):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, _):
-            controller = session.declare_publisher("site", "arm", "controller")
-            controller.put(schema.ControllerState(trace=schema.ControllerState.YES))
+async def test_a_controllers_trace_opens_and_closes_a_capture(mesh, tmp_path):
+    async with recording_arm(mesh, tmp_path) as (session, _):
+        controller = session.declare_publisher("site", "arm", "controller")
+        controller.put(schema.ControllerState(trace=schema.ControllerState.YES))
 
-            async def listed(condition):
-                while True:
-                    answer = await session.ask(LIST, timeout_s=20.0)
-                    if [row for row in answer.recordings if condition(row)]:
-                        return
-                    await asyncio.sleep(0.02)
+        async def listed(condition):
+            while True:
+                answer = await session.ask(LIST, timeout_s=20.0)
+                if [row for row in answer.recordings if condition(row)]:
+                    return
+                await asyncio.sleep(0.02)
 
-            await listed(lambda row: row.open and row.started_by == "trace")
-            controller.put(schema.ControllerState(trace=schema.ControllerState.NO))
-            await listed(lambda row: not row.open)
-
-    run(main())
+        await listed(lambda row: row.open and row.started_by == "trace")
+        controller.put(schema.ControllerState(trace=schema.ControllerState.NO))
+        await listed(lambda row: not row.open)
 
 
-def test_a_trace_during_a_recording_joins_it_with_an_event(mesh, tmp_path):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, publisher):
-            events = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
-            controller = session.declare_publisher("site", "arm", "controller")
-            await trace_on(session, name="trial")
-            await until_watched(publisher)
-            controller.put(schema.ControllerState(trace=schema.ControllerState.YES))
-            event = await next_event(events, "recorder.trace_joined")
-            assert event.values["recording"] == "trial"
-
-    run(main())
+async def test_a_trace_during_a_recording_joins_it_with_an_event(mesh, tmp_path):
+    async with recording_arm(mesh, tmp_path) as (session, publisher):
+        events = session.subscribe("robomesh/site/arm/events/recorder", newest=100)
+        controller = session.declare_publisher("site", "arm", "controller")
+        await trace_on(session, name="trial")
+        await until_watched(publisher)
+        controller.put(schema.ControllerState(trace=schema.ControllerState.YES))
+        event = await next_event(events, "recorder.trace_joined")
+        assert event.values["recording"] == "trial"
 
 
-def test_an_unfinished_file_is_recovered_but_no_open_or_foreign_one(mesh, tmp_path):
+async def test_an_unfinished_file_is_recovered_but_no_open_or_foreign_one(mesh, tmp_path):
     about = {"site": "site", "robot": "arm", "name": "left", "started_by": "request"}
     left, empty = (tmp_path / "arm" / name for name in ("left.mcap", "empty.mcap"))
     killed = Capture(left, about, start_ns=1)
@@ -177,64 +163,51 @@ def test_an_unfinished_file_is_recovered_but_no_open_or_foreign_one(mesh, tmp_pa
     other_program = tmp_path / "arm" / "other.mcap"
     other_program.write_bytes(records.start())
     empty.touch()
-
-    async def main():
-        async with recording_arm(mesh, tmp_path):
-            await until(lambda: state_of(left) is State.INDEXED and not empty.exists())
-
-    run(main())
+    async with recording_arm(mesh, tmp_path):
+        await until(lambda: state_of(left) is State.INDEXED and not empty.exists())
     assert state_of(another.path) is State.OPEN
     assert other_program.read_bytes() == records.start()
     another.finish({})
     assert state_of(another.path) is State.INDEXED
 
 
-def test_invalid_requests_are_refused(mesh, tmp_path):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, _):
-            with refused(codes.RECORDING_NOT_OPEN, robot="arm"):
-                await trace_off(session)
-            with refused(codes.RECORDING_NAME, name="../etc"):
-                await trace_on(session, name="../etc")
-            await trace_on(session, name="one")
-            with refused(codes.RECORDING_OPEN, robot="arm", name="one"):
-                await trace_on(session, name="two")
-
-    run(main())
+async def test_invalid_requests_are_refused(mesh, tmp_path):
+    async with recording_arm(mesh, tmp_path) as (session, _):
+        with refused(codes.RECORDING_NOT_OPEN, robot="arm"):
+            await trace_off(session)
+        with refused(codes.RECORDING_NAME, name="../etc"):
+            await trace_on(session, name="../etc")
+        await trace_on(session, name="one")
+        with refused(codes.RECORDING_OPEN, robot="arm", name="one"):
+            await trace_on(session, name="two")
 
 
-def test_the_end_of_the_service_closes_the_file(mesh, tmp_path):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, publisher):
-            await trace_on(session, name="cut")
-            await until_watched(publisher)
-            await put_states(publisher, range(20))
-
-    run(main())
+async def test_the_end_of_the_service_closes_the_file(mesh, tmp_path):
+    async with recording_arm(mesh, tmp_path) as (session, publisher):
+        await trace_on(session, name="cut")
+        await until_watched(publisher)
+        await put_states(publisher, range(20))
     (file,) = (tmp_path / "arm").glob("*.mcap")
     recording = describe_file(file)
     assert recording.problem == ""
     assert {row.topic.rsplit("/", 1)[-1]: row.messages for row in recording.topics}["joints"] == 20
 
 
-def test_a_full_disk_ends_the_capture_with_an_event_but_not_the_recorder(mesh, tmp_path, caplog):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, publisher):
-            await trace_on(session, name="full")
-            await until_watched(publisher)
-            (file,) = (tmp_path / "arm").glob("*.mcap")
-            await until(lambda: file.stat().st_size)
-            fill_disk_under(tmp_path / "arm")
-            await put_states(publisher, range(60))
-            with refused(codes.RECORDING_NOT_OPEN, robot="arm"):
-                await trace_off(session)
-            await trace_on(session, name="again")
-            listed = await session.ask(LIST, timeout_s=20.0)
-            rows = {row.name: row for row in listed.recordings}
-            assert rows["again"].open
-            assert (rows["full"].open, rows["full"].problem_reason.code) == (False, "recording.disk_full")
-
-    run(main())
+async def test_a_full_disk_ends_the_capture_with_an_event_but_not_the_recorder(mesh, tmp_path, caplog):
+    async with recording_arm(mesh, tmp_path) as (session, publisher):
+        await trace_on(session, name="full")
+        await until_watched(publisher)
+        (file,) = (tmp_path / "arm").glob("*.mcap")
+        await until(lambda: file.stat().st_size)
+        fill_disk_under(tmp_path / "arm")
+        await put_states(publisher, range(60))
+        with refused(codes.RECORDING_NOT_OPEN, robot="arm"):
+            await trace_off(session)
+        await trace_on(session, name="again")
+        listed = await session.ask(LIST, timeout_s=20.0)
+        rows = {row.name: row for row in listed.recordings}
+        assert rows["again"].open
+        assert (rows["full"].open, rows["full"].problem_reason.code) == (False, "recording.disk_full")
     assert "recording full ended: no space left on the disk; what was written is kept" in caplog.text
 
 
@@ -253,15 +226,12 @@ def opens(link):
         return ""
 
 
-def test_a_file_cut_anywhere_or_with_a_changed_byte_is_described_or_refused(mesh, tmp_path):
-    async def main():
-        async with recording_arm(mesh, tmp_path) as (session, publisher):
-            await trace_on(session, name="whole")
-            await until_watched(publisher)
-            await put_states(publisher, range(5))
-            await trace_off(session)
-
-    run(main())
+async def test_a_file_cut_anywhere_or_with_a_changed_byte_is_described_or_refused(mesh, tmp_path):
+    async with recording_arm(mesh, tmp_path) as (session, publisher):
+        await trace_on(session, name="whole")
+        await until_watched(publisher)
+        await put_states(publisher, range(5))
+        await trace_off(session)
     (file,) = (tmp_path / "arm").glob("*.mcap")
     data = file.read_bytes()
     cut = tmp_path / "cut.mcap"

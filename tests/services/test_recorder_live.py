@@ -132,27 +132,22 @@ async def pictures(video):
         await asyncio.sleep(0.05)
 
 
-def test_below_the_mark_video_is_dropped_counted_and_reported(mesh, tmp_path):
-    async def main():
-        free = FreeSpace(warn_mib=0, video_mib=1 << 42, states_mib=0)
-        async with recording_site(mesh, tmp_path, free=free, views=("front",)) as session:
-            joints, video = (
-                session.declare_publisher("site", "arm", name) for name in ("joints", "video/front")
-            )
-            events = session.subscribe("robomesh/site/-/events/recorder", newest=100)
-            await trace_on(session)
-            await until(lambda: joints.watched and video.watched)
-            await put_states(joints, range(5))
-            # A first picture may be the past of the subscription, and no picture overtakes the capture's end.
-            shows = asyncio.create_task(pictures(video))
-            await next_state(session, lambda now: any(row.topic == VIDEO for row in now.topics))
-            shows.cancel()
-            done = await trace_off(session)
-            message = (await anext(events)).message()
-            received = message.events if isinstance(message, schema.EventList) else [message]
-            return received[0], {row.topic: (row.messages, row.lost) for row in done.topics}
-
-    event, topics = run(main())
+async def test_below_the_mark_video_is_dropped_counted_and_reported(mesh, tmp_path):
+    free = FreeSpace(warn_mib=0, video_mib=1 << 42, states_mib=0)
+    async with recording_site(mesh, tmp_path, free=free, views=("front",)) as session:
+        joints, video = (session.declare_publisher("site", "arm", name) for name in ("joints", "video/front"))
+        events = session.subscribe("robomesh/site/-/events/recorder", newest=100)
+        await trace_on(session)
+        await until(lambda: joints.watched and video.watched)
+        await put_states(joints, range(5))
+        # A first picture may be the past of the subscription, and no picture overtakes the capture's end.
+        shows = asyncio.create_task(pictures(video))
+        await next_state(session, lambda now: any(row.topic == VIDEO for row in now.topics))
+        shows.cancel()
+        done = await trace_off(session)
+        message = (await anext(events)).message()
+        received = message.events if isinstance(message, schema.EventList) else [message]
+        event, topics = received[0], {row.topic: (row.messages, row.lost) for row in done.topics}
     assert event.code == "recorder.gives_up"
     assert event.severity == schema.Event.Severity.CRITICAL
 

@@ -108,92 +108,74 @@ def test_an_invalid_change_is_refused_and_changes_nothing(action, values, code, 
         changes_of.changed(schema.Recording(name="trial"), (), asked, "li", 1)
 
 
-def test_a_change_of_no_recording_is_refused(mesh, trial, tmp_path):
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            for file in ("", "gone.mcap", "../arm/x.mcap", "/etc/passwd", "a\0b.mcap", "*.mcap"):
-                for action in (Ask.RENAME, Ask.DELETE):
-                    with refused(codes.RECORDING_UNKNOWN):
-                        await ask(session, action, file, name="x", reason="y")
-
-    run(main())
+async def test_a_change_of_no_recording_is_refused(mesh, trial, tmp_path):
+    async with recording_site(mesh, tmp_path) as session:
+        for file in ("", "gone.mcap", "../arm/x.mcap", "/etc/passwd", "a\0b.mcap", "*.mcap"):
+            for action in (Ask.RENAME, Ask.DELETE):
+                with refused(codes.RECORDING_UNKNOWN):
+                    await ask(session, action, file, name="x", reason="y")
     assert trial.exists()
 
 
-def test_a_deletion_names_author_reason_and_hash_and_stays_visible(mesh, trial, tmp_path):
+async def test_a_deletion_names_author_reason_and_hash_and_stays_visible(mesh, trial, tmp_path):
     data = trial.read_bytes()
     hashed = hashlib.sha256(data).hexdigest()
-
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            events = session.subscribe("robomesh/site/arm/events/recorder", newest=100, history=False)
-            await ask(session, Ask.RENAME, trial.name, name="first try")
-            await ask(session, Ask.DELETE, trial.name, based_on=1, reason="arm was not clamped")
-            event = await next_event(events, "recording.deleted")
-            assert event.values["sha256"] == hashed
-            assert event.values["bytes"] == str(len(data))
-            for word in ("li", "first try", "arm was not clamped", trial.name, hashed):
-                assert word in event.text
-            repeated = await ask(session, Ask.DELETE, trial.name, based_on=1, reason="arm was not clamped")
-            assert repeated.deleted
-            with refused(codes.RECORDING_UNKNOWN):
-                await ask(session, Ask.DELETE, trial.name, by="wang", reason="me too")
-            assert trial.name not in await listed(session)
-            gone = (await listed(session, deleted=True))[trial.name]
-            assert gone.deleted
-            assert (gone.name, gone.robot, gone.bytes) == ("first try", "arm", len(data))
-            assert gone.history[-1].reason == "arm was not clamped"
-
-    run(main())
+    async with recording_site(mesh, tmp_path) as session:
+        events = session.subscribe("robomesh/site/arm/events/recorder", newest=100, history=False)
+        await ask(session, Ask.RENAME, trial.name, name="first try")
+        await ask(session, Ask.DELETE, trial.name, based_on=1, reason="arm was not clamped")
+        event = await next_event(events, "recording.deleted")
+        assert event.values["sha256"] == hashed
+        assert event.values["bytes"] == str(len(data))
+        for word in ("li", "first try", "arm was not clamped", trial.name, hashed):
+            assert word in event.text
+        repeated = await ask(session, Ask.DELETE, trial.name, based_on=1, reason="arm was not clamped")
+        assert repeated.deleted
+        with refused(codes.RECORDING_UNKNOWN):
+            await ask(session, Ask.DELETE, trial.name, by="wang", reason="me too")
+        assert trial.name not in await listed(session)
+        gone = (await listed(session, deleted=True))[trial.name]
+        assert gone.deleted
+        assert (gone.name, gone.robot, gone.bytes) == ("first try", "arm", len(data))
+        assert gone.history[-1].reason == "arm was not clamped"
     assert [each.name for each in trial.parent.iterdir()] == [changes_path(trial).name]
 
 
-def test_a_deleted_recording_of_the_recorders_own_folder_has_no_robot(mesh, tmp_path):
+async def test_a_deleted_recording_of_the_recorders_own_folder_has_no_robot(mesh, tmp_path):
     path = tmp_path / "2026-11-25T10-00-00.000000Z_trial.mcap"
     write_recording(path)
-
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            assert (await ask(session, Ask.DELETE, path.name, reason="test")).deleted
-            assert (await listed(session, deleted=True))[path.name].robot == ""
-
-    run(main())
+    async with recording_site(mesh, tmp_path) as session:
+        assert (await ask(session, Ask.DELETE, path.name, reason="test")).deleted
+        assert (await listed(session, deleted=True))[path.name].robot == ""
 
 
-def test_a_recording_in_use_is_not_deleted(mesh, trial, tmp_path):
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            open_now = (await trace_on(session, name="now")).file
-            with refused(codes.RECORDING_WRITTEN):
-                await ask(session, Ask.DELETE, open_now, reason="x")
-            renamed = await ask(session, Ask.RENAME, open_now, name="while it runs")
-            assert renamed.open
-            assert (await trace_off(session)).name == "while it runs"
-            with RecordingFile(trial), refused(codes.RECORDING_PLAYED):  # as a player keeps it open
-                await ask(session, Ask.DELETE, trial.name, reason="x")
-            file = RecorderFile(session, "site", trial.name, asker="wang")
-            first = await file.piece(length=10)
-            with refused(codes.RECORDING_FETCHED, who="wang"):
-                await ask(session, Ask.DELETE, trial.name, reason="x")
-            await file.piece(offset=10, length=first.total)
+async def test_a_recording_in_use_is_not_deleted(mesh, trial, tmp_path):
+    async with recording_site(mesh, tmp_path) as session:
+        open_now = (await trace_on(session, name="now")).file
+        with refused(codes.RECORDING_WRITTEN):
+            await ask(session, Ask.DELETE, open_now, reason="x")
+        renamed = await ask(session, Ask.RENAME, open_now, name="while it runs")
+        assert renamed.open
+        assert (await trace_off(session)).name == "while it runs"
+        with RecordingFile(trial), refused(codes.RECORDING_PLAYED):  # as a player keeps it open
             await ask(session, Ask.DELETE, trial.name, reason="x")
-
-    run(main())
+        file = RecorderFile(session, "site", trial.name, asker="wang")
+        first = await file.piece(length=10)
+        with refused(codes.RECORDING_FETCHED, who="wang"):
+            await ask(session, Ask.DELETE, trial.name, reason="x")
+        await file.piece(offset=10, length=first.total)
+        await ask(session, Ask.DELETE, trial.name, reason="x")
     assert not trial.exists()
 
 
-def test_a_fetched_recording_brings_its_name_note_and_tags(mesh, trial, tmp_path, capsys):
+async def test_a_fetched_recording_brings_its_name_note_and_tags(mesh, trial, tmp_path, capsys):
     out = tmp_path / "copy"
     out.mkdir()
-
-    async def main():
-        served = Served(service="recorder", present_for=(("site", "-"),))
-        async with recording_site(mesh, tmp_path) as session, present(session, served):
-            file = RecorderFile(session, "site", trial.name, asker="li")
-            await file.change(Ask(action=Ask.RENAME, name="renamed"))
-            await file.fetch(out / "mine.mcap")
-
-    run(main())
+    served = Served(service="recorder", present_for=(("site", "-"),))
+    async with recording_site(mesh, tmp_path) as session, present(session, served):
+        file = RecorderFile(session, "site", trial.name, asker="li")
+        await file.change(Ask(action=Ask.RENAME, name="renamed"))
+        await file.fetch(out / "mine.mcap")
     assert (out / "mine.mcap").read_bytes() == trial.read_bytes()
     assert robomesh(["recordings", "info", str(out / "mine.mcap"), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["name"] == "renamed"
@@ -258,7 +240,9 @@ def test_a_kill_at_any_step_leaves_the_recording_or_its_deletion(trial, tmp_path
     assert begun > 1
 
 
-def test_on_a_full_disk_a_deletion_makes_room_and_a_rename_is_refused(mesh, trial, tmp_path, monkeypatch):
+async def test_on_a_full_disk_a_deletion_makes_room_and_a_rename_is_refused(
+    mesh, trial, tmp_path, monkeypatch
+):
     from services.recorder import changes
 
     real = changes.write_changes
@@ -271,58 +255,48 @@ def test_on_a_full_disk_a_deletion_makes_room_and_a_rename_is_refused(mesh, tria
         real(path, values)
 
     monkeypatch.setattr(changes, "write_changes", write)
-
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            with refused(codes.RECORDING_DISK):
-                await ask(session, Ask.RENAME, trial.name, name="x")
-            assert trial.exists()
-            assert (await ask(session, Ask.DELETE, trial.name, reason="disk full")).deleted
-
-    run(main())
+    async with recording_site(mesh, tmp_path) as session:
+        with refused(codes.RECORDING_DISK):
+            await ask(session, Ask.RENAME, trial.name, name="x")
+        assert trial.exists()
+        assert (await ask(session, Ask.DELETE, trial.name, reason="disk full")).deleted
     assert not trial.exists()
     assert read_changes(trial)[-1].reason == "disk full"
 
 
-def test_a_damaged_file_of_changes_is_put_aside_with_an_event(mesh, trial, tmp_path):
-    async def main():
-        async with recording_site(mesh, tmp_path) as session:
-            events = session.subscribe("robomesh/site/-/events/recorder", newest=100, history=False)
-            for content in ("", "{", '{"changes": 1}', '{"changes": [{"number": 4}]}'):
-                changes_path(trial).write_text(content)
-                assert (await listed(session))[trial.name].name == trial.stem
-                await ask(session, Ask.RENAME, trial.name, name="x")
-                await next_event(events, "recording.labels_damaged")
-                assert (await listed(session))[trial.name].name == "x"
-                assert changes_path(trial).with_suffix(".damaged").read_text() == content
-
-    run(main())
+async def test_a_damaged_file_of_changes_is_put_aside_with_an_event(mesh, trial, tmp_path):
+    async with recording_site(mesh, tmp_path) as session:
+        events = session.subscribe("robomesh/site/-/events/recorder", newest=100, history=False)
+        for content in ("", "{", '{"changes": 1}', '{"changes": [{"number": 4}]}'):
+            changes_path(trial).write_text(content)
+            assert (await listed(session))[trial.name].name == trial.stem
+            await ask(session, Ask.RENAME, trial.name, name="x")
+            await next_event(events, "recording.labels_damaged")
+            assert (await listed(session))[trial.name].name == "x"
+            assert changes_path(trial).with_suffix(".damaged").read_text() == content
 
 
-def test_the_command_line_renames_notes_tags_and_deletes(mesh, trial, tmp_path, capsys):
+async def test_the_command_line_renames_notes_tags_and_deletes(mesh, trial, tmp_path, capsys):
     def command(*words):
         status = robomesh(["recordings", *words, "--connect", mesh.connect[0]])
         return status, capsys.readouterr()
 
-    async def main():
-        served = Served(service="recorder", present_for=(("site", "-"),))
-        async with recording_site(mesh, tmp_path) as session, present(session, served):
-            await session.ask(f"{BASE}/list", timeout_s=WITHIN_S)
-            call = asyncio.to_thread
-            assert (await call(command, "rename", trial.name, "second try", "--operator", "li"))[0] == 0
-            assert (await call(command, "note", "second try", "ok", "--operator", "li"))[0] == 0
-            assert (await call(command, "tag", "second try", "a", "b", "--operator", "li"))[0] == 0
-            status, out = await call(command, "tag", "second try", "A", "--remove", "--json")
-            assert status == 0, out.err
-            assert json.loads(out.out)["tags"] == ["b"]
-            _, out = await call(command, "list", "--tag", "B", "--json")
-            assert json.loads(out.out)["note"] == "ok"
-            assert (await call(command, "list", "--tag", "c"))[1].out == "no recordings\n"
-            status, out = await call(command, "delete", "second try", "--reason", "done")
-            assert status == 0, out.err
-            assert "SHA-256" in out.out
-            assert (await call(command, "list"))[1].out == "no recordings\n"
-            assert "deleted by" in (await call(command, "list", "--deleted"))[1].out
-            assert (await call(command, "delete", "second try", "--reason", "x"))[0] == 2
-
-    run(main())
+    served = Served(service="recorder", present_for=(("site", "-"),))
+    async with recording_site(mesh, tmp_path) as session, present(session, served):
+        await session.ask(f"{BASE}/list", timeout_s=WITHIN_S)
+        call = asyncio.to_thread
+        assert (await call(command, "rename", trial.name, "second try", "--operator", "li"))[0] == 0
+        assert (await call(command, "note", "second try", "ok", "--operator", "li"))[0] == 0
+        assert (await call(command, "tag", "second try", "a", "b", "--operator", "li"))[0] == 0
+        status, out = await call(command, "tag", "second try", "A", "--remove", "--json")
+        assert status == 0, out.err
+        assert json.loads(out.out)["tags"] == ["b"]
+        _, out = await call(command, "list", "--tag", "B", "--json")
+        assert json.loads(out.out)["note"] == "ok"
+        assert (await call(command, "list", "--tag", "c"))[1].out == "no recordings\n"
+        status, out = await call(command, "delete", "second try", "--reason", "done")
+        assert status == 0, out.err
+        assert "SHA-256" in out.out
+        assert (await call(command, "list"))[1].out == "no recordings\n"
+        assert "deleted by" in (await call(command, "list", "--deleted"))[1].out
+        assert (await call(command, "delete", "second try", "--reason", "x"))[0] == 2

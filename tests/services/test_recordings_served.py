@@ -61,22 +61,19 @@ async def served(mesh, folder, quotas=DEFAULT_QUOTAS, **open_now):
             await server.close()
 
 
-def test_a_recorder_with_a_hanging_reader_is_busy_and_answers_later(mesh, folder):
-    async def main():
-        async with open_session(mesh) as service, open_session(mesh) as client:
-            server = RecordingServer(service, "site", folder, open_now=dict, flight=lambda: True)
-            try:
-                assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
-                os.kill(server.pid, signal.SIGSTOP)
-                for _ in range(2):
-                    with refused(codes.RECORDER_BUSY, request="list"):
-                        await client.ask(f"{BASE}/list", timeout_s=0.5)
-                os.kill(server.pid, signal.SIGCONT)
-                assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
-            finally:
-                await server.close()
-
-    run(main())
+async def test_a_recorder_with_a_hanging_reader_is_busy_and_answers_later(mesh, folder):
+    async with open_session(mesh) as service, open_session(mesh) as client:
+        server = RecordingServer(service, "site", folder, open_now=dict, flight=lambda: True)
+        try:
+            assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
+            os.kill(server.pid, signal.SIGSTOP)
+            for _ in range(2):
+                with refused(codes.RECORDER_BUSY, request="list"):
+                    await client.ask(f"{BASE}/list", timeout_s=0.5)
+            os.kill(server.pid, signal.SIGCONT)
+            assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
+        finally:
+            await server.close()
 
 
 def test_list_info_and_range_over_the_mesh_with_their_refusals(mesh, folder):
@@ -351,15 +348,12 @@ def test_http_errors_have_a_status_and_a_retry_after(folder, error, status, agai
     assert read_refusal(answer.headers, answer.content).code == code
 
 
-def test_a_site_without_a_recorder_is_refused_after_one_attempt(mesh):
-    async def main():
-        async with open_session(mesh) as session:
-            recordings = Recordings(session, lambda _: "li")
-            get = _Http(Starlette(routes=recordings.routes())).request
-            return await get("/recordings/unknown-site/trial.mcap")
-
+async def test_a_site_without_a_recorder_is_refused_after_one_attempt(mesh):
     began = time.monotonic()
-    answer = run(main())
+    async with open_session(mesh) as session:
+        recordings = Recordings(session, lambda _: "li")
+        get = _Http(Starlette(routes=recordings.routes())).request
+        answer = await get("/recordings/unknown-site/trial.mcap")
     # The attempts for a site with a slow line take 37 s in all.
     assert time.monotonic() - began < 20.0
     reason = read_refusal(answer.headers, answer.content)

@@ -14,7 +14,7 @@ from robomesh.contract.topics import Role
 from services.pki import authority, certificates
 from services.router.rolling_restart import neighbours, wait_for_turn
 from services.router.router import read_access
-from tests.conftest import free_port, run
+from tests.conftest import free_port
 from tests.services.test_router_rules import attached, names, prepared, routing, settings_of, until
 
 
@@ -34,30 +34,7 @@ async def linked_sites(tmp_path, border="open", sites=()):
     return (here, at_here), (there, at_there), link
 
 
-def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
-    async def main():
-        (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
-        authority.issue(there, "li", Role.OPERATOR)
-        async with (
-            routing(settings_of(here, at_here), settings_of(there, at_there, link)),
-            attached(at_here, here.service("gateway")) as ours,
-            attached(at_there, there.person("li")) as li,
-        ):
-            asked = []
-
-            async def answer(request):
-                asked.append(request.chunk)
-                return deeds_answer()
-
-            ours.answer("here", "arm", "command/*", answer)
-
-            async def sees():
-                return {("here", "router"), ("there", "router")} <= await names(li)
-
-            await until(sees)
-            await li.ask(robot_key("here", "arm", "command/li.there"), command(), timeout_s=20.0)
-            assert asked == ["li.there"]
-
+async def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
     from robomesh.schemas.robomesh_pb2 import CommandAnswer, CommandRequest
 
     def deeds_answer():
@@ -66,7 +43,27 @@ def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
     def command():
         return CommandRequest(command=CommandRequest.HOME)
 
-    run(main(), timeout_s=60.0)
+    (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
+    authority.issue(there, "li", Role.OPERATOR)
+    async with (
+        routing(settings_of(here, at_here), settings_of(there, at_there, link)),
+        attached(at_here, here.service("gateway")) as ours,
+        attached(at_there, there.person("li")) as li,
+    ):
+        asked = []
+
+        async def answer(request):
+            asked.append(request.chunk)
+            return deeds_answer()
+
+        ours.answer("here", "arm", "command/*", answer)
+
+        async def sees():
+            return {("here", "router"), ("there", "router")} <= await names(li)
+
+        await until(sees)
+        await li.ask(robot_key("here", "arm", "command/li.there"), command(), timeout_s=20.0)
+        assert asked == ["li.there"]
 
 
 async def test_a_gateway_of_another_site_neither_answers_nor_shows_itself_for_our_robot(tmp_path):

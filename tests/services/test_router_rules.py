@@ -77,25 +77,9 @@ async def names(session):
     return {(who.site, who.service) for who in await session.present()}
 
 
-def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path):
+async def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path):
     folder, endpoint = prepared(tmp_path)
     authority.issue(folder, "li", Role.OPERATOR)
-
-    async def main():
-        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("li")) as li:
-            await until(lambda: there(li, (SITE, "router")))
-            async with attached(endpoint, folder.service("watch")) as watch:
-                events = watch.subscribe("robomesh/*/-/events/*", newest=100)
-                authority.revoke(folder, "li")
-                async for event in events:
-                    if "router.without_rights" in str(event.message()):
-                        assert "li.here is connected, but has no right here" in str(event.message())
-                        break
-            await until(lambda: is_empty(li))
-            authority.issue(folder, "mo", Role.MONITOR)
-            async with attached(endpoint, folder.person("mo")) as mo:
-                await until(lambda: there(mo, (SITE, "router")))
-                assert await is_empty(li)
 
     async def there(session, who):
         return who in await names(session)
@@ -103,10 +87,23 @@ def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path):
     async def is_empty(session):
         return not await names(session)
 
-    run(main(), timeout_s=60.0)
+    async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("li")) as li:
+        await until(lambda: there(li, (SITE, "router")))
+        async with attached(endpoint, folder.service("watch")) as watch:
+            events = watch.subscribe("robomesh/*/-/events/*", newest=100)
+            authority.revoke(folder, "li")
+            async for event in events:
+                if "router.without_rights" in str(event.message()):
+                    assert "li.here is connected, but has no right here" in str(event.message())
+                    break
+        await until(lambda: is_empty(li))
+        authority.issue(folder, "mo", Role.MONITOR)
+        async with attached(endpoint, folder.person("mo")) as mo:
+            await until(lambda: there(mo, (SITE, "router")))
+            assert await is_empty(li)
 
 
-def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
+async def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
     folder, endpoint = prepared(tmp_path)
     authority.issue(folder, "mo", Role.MONITOR)
     good = folder.access.read_text()
@@ -114,18 +111,15 @@ def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
     async def refused():
         return "keeps its current rules and keys" in caplog.text
 
-    async def main():
-        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
-            for broken in ("{", good.replace('"deny"', '"allow"')):
-                caplog.clear()
-                folder.access.write_text(broken)
-                await until(refused)
-                await until(lambda: present(mo))
-
     async def present(session):
         return (SITE, "router") in await names(session)
 
-    run(main(), timeout_s=60.0)
+    async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
+        for broken in ("{", good.replace('"deny"', '"allow"')):
+            caplog.clear()
+            folder.access.write_text(broken)
+            await until(refused)
+            await until(lambda: present(mo))
 
 
 KEPT = {"enabled": True, "default_permission": "deny", "subjects": [{"cert_common_names": ["li.here"]}]}
@@ -303,7 +297,7 @@ def test_a_certificate_shows_its_name_and_authority(tmp_path):
     assert entry.expires == shown.expires
 
 
-def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when_they_are_whole(
+async def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when_they_are_whole(
     tmp_path, caplog
 ):
     folder, endpoint = prepared(tmp_path)
@@ -317,22 +311,6 @@ def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when
     other_key = bundle_of_router.read_bytes()
     bundle_of_router.write_bytes(good)
 
-    async def main():
-        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
-            identity = await router_of(mo)
-            begin, of_good = other_key.index(b"-----BEGIN CERT"), good.index(b"-----BEGIN CERT")
-            for broken in (None, good[: len(good) // 2], good[:of_good] + other_key[begin:]):
-                caplog.clear()
-                if broken is None:
-                    bundle_of_router.unlink()
-                else:
-                    bundle_of_router.write_bytes(broken)
-                await until(goes_on)
-            assert await router_of(mo) == identity, "it was not even opened anew"
-            bundle_of_router.write_bytes(other_key)
-            while await router_of(mo) == identity:
-                await asyncio.sleep(0.05)
-
     async def goes_on():
         return "router.pem cannot be used: " in caplog.text
 
@@ -341,22 +319,28 @@ def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_them_when
             await asyncio.sleep(0.05)
         return str(routers[0])
 
-    run(main(), timeout_s=60.0)
+    async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
+        identity = await router_of(mo)
+        begin, of_good = other_key.index(b"-----BEGIN CERT"), good.index(b"-----BEGIN CERT")
+        for broken in (None, good[: len(good) // 2], good[:of_good] + other_key[begin:]):
+            caplog.clear()
+            if broken is None:
+                bundle_of_router.unlink()
+            else:
+                bundle_of_router.write_bytes(broken)
+            await until(goes_on)
+        assert await router_of(mo) == identity, "it was not even opened anew"
+        bundle_of_router.write_bytes(other_key)
+        while await router_of(mo) == identity:
+            await asyncio.sleep(0.05)
 
 
-def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
+async def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
     caplog.set_level("INFO")
     folder, endpoint = prepared(tmp_path)
     authority.issue(folder, "mo", Role.MONITOR)
     rules = json.loads("\n".join(folder.access.read_text().splitlines()[1:]))
     rules["access_control"]["policies"][0]["rules"] = ["no such rule"]
-
-    async def main():
-        async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
-            folder.access.write_text(json.dumps(rules))
-            await until(refused)
-            assert "the router follows" not in caplog.text
-            await until(lambda: present(mo))
 
     async def refused():
         return "Zenoh rejects it; the router keeps its current rules and keys" in caplog.text
@@ -364,7 +348,11 @@ def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
     async def present(session):
         return (SITE, "router") in await names(session)
 
-    run(main(), timeout_s=60.0)
+    async with routing(settings_of(folder, endpoint)), attached(endpoint, folder.person("mo")) as mo:
+        folder.access.write_text(json.dumps(rules))
+        await until(refused)
+        assert "the router follows" not in caplog.text
+        await until(lambda: present(mo))
 
 
 def test_a_renewed_certificate_is_reported_without_a_restart(tmp_path):

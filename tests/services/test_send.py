@@ -133,19 +133,16 @@ async def test_a_silent_gateway_is_reported_with_advice_and_an_unanswered_stop_i
         assert text.startswith("interrupted: the stop failed: no answer to robomesh/hall/arm/stop")
 
 
-def test_a_gateway_restart_is_reported_with_advice_and_warnings_are_printed_first(mesh, capsys):
-    async def main():
-        async with open_session(mesh) as session, open_session(mesh) as li:
-            gateway = Gateway(
-                session, RUNNING, schema.ProgramState(), text="RUN_PROGRAM: it runs; mind: arm touches post"
-            )
-            gateway.ready.set()
-            publishing = asyncio.create_task(gateway.publish_states())
-            ended = await sent(li)
-            publishing.cancel()
-            return ended
-
-    accepted, text, warning = run(main())
+async def test_a_gateway_restart_is_reported_with_advice_and_warnings_are_printed_first(mesh, capsys):
+    async with open_session(mesh) as session, open_session(mesh) as li:
+        gateway = Gateway(
+            session, RUNNING, schema.ProgramState(), text="RUN_PROGRAM: it runs; mind: arm touches post"
+        )
+        gateway.ready.set()
+        publishing = asyncio.create_task(gateway.publish_states())
+        ended = await sent(li)
+        publishing.cancel()
+        accepted, text, warning = ended
     assert (accepted, warning) == (False, "arm touches post")
     assert text.startswith("the gateway restarted, so the program no longer runs")
     assert "`robomesh send hall/arm stop`" in text

@@ -8,7 +8,6 @@ import pytest
 from services.console.accounts.passwords import Verifier
 from services.console.accounts.sign_in_queue import MOST_OF_ADDRESS, MOST_OF_NAME, MOST_WAITING, SignInQueue
 from services.console.common.errors import SignInBusyError
-from tests.conftest import run
 
 
 def filled(*attempts):
@@ -53,28 +52,24 @@ def test_an_address_finds_a_place_in_a_queue_that_others_have_filled():
     assert "own" in taken(queue)[: len(addresses) + 1]
 
 
-def test_the_sender_of_most_attempts_is_not_verified_next():
+async def test_the_sender_of_most_attempts_is_not_verified_next():
     held, begun, order = threading.Event(), threading.Event(), []
+    verifier = Verifier()
 
-    async def main():
-        verifier = Verifier()
+    def wait():
+        begun.set()
+        assert held.wait(30.0)
 
-        def wait():
-            begun.set()
-            assert held.wait(30.0)
+    async def one(address, name):
+        await verifier._do(lambda: order.append((address, name)), address, name)
 
-        async def one(address, name):
-            await verifier._do(lambda: order.append((address, name)), address, name)
-
-        flood = [asyncio.create_task(verifier._do(wait, "a", "first"))]
-        await asyncio.to_thread(begun.wait, 30.0)
-        flood += [asyncio.create_task(one("a", f"n{n}")) for n in range(MOST_OF_ADDRESS)]
-        await asyncio.sleep(0)
-        own = asyncio.create_task(one("b", "li"))
-        await asyncio.sleep(0)
-        held.set()
-        await asyncio.gather(*flood, own)
-        verifier.close()
-
-    run(main())
+    flood = [asyncio.create_task(verifier._do(wait, "a", "first"))]
+    await asyncio.to_thread(begun.wait, 30.0)
+    flood += [asyncio.create_task(one("a", f"n{n}")) for n in range(MOST_OF_ADDRESS)]
+    await asyncio.sleep(0)
+    own = asyncio.create_task(one("b", "li"))
+    await asyncio.sleep(0)
+    held.set()
+    await asyncio.gather(*flood, own)
+    verifier.close()
     assert order.index(("b", "li")) <= 1

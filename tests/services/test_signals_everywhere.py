@@ -19,7 +19,6 @@ from services.command_line.main import run as robomesh_run
 from services.recorder import recorder
 from services.recorder.reading.answers import Answers
 from services.recorder.settings import Settings
-from tests.conftest import run
 from tests.controllers.universal_robots.test_rtde_driver import UR, controller
 from tests.protocol_gateway.gateway_site import gateway, until
 from tests.recordings import START_NS, Written, joints
@@ -148,34 +147,30 @@ async def test_they_are_live_in_python_the_terminal_and_prometheus(mesh, router,
         assert "has no current signals" in none.stderr
 
 
-def test_a_recorder_keeps_every_published_message(mesh, tmp_path):
+async def test_a_recorder_keeps_every_published_message(mesh, tmp_path):
     ask, key = schema.RecorderRequest, "robomesh/hall/arm/recorder/request"
-
-    async def main():
-        async with (
-            controller(demo=True) as (port, primary),
-            gateway(mesh, tmp_path / "gateway", port, **UR, ports={"primary": primary}) as site,
-            open_session(mesh) as own,
-        ):
-            settings = Settings(site="hall", robots=("arm",), folder=tmp_path / "recorded")
-            task = asyncio.create_task(recorder.serve(own, settings))
-            published = {}
-            following = asyncio.create_task(
-                watch(site.session.subscribe(site.key("signals"), newest=1000), published)
-            )
-            try:
-                await until(lambda: published)
-                await site.session.ask(key, ask(action=ask.TRACE_ON), timeout_s=20.0)
-                first = max(published)
-                await until(lambda: max(published) >= first + 12)
-                answer = await site.session.ask(key, ask(action=ask.TRACE_OFF), timeout_s=20.0)
-            finally:
-                for each in (following, task):
-                    each.cancel()
-                await asyncio.gather(following, task, return_exceptions=True)
-        return published, answer.file
-
-    published, name = run(main())
+    async with (
+        controller(demo=True) as (port, primary),
+        gateway(mesh, tmp_path / "gateway", port, **UR, ports={"primary": primary}) as site,
+        open_session(mesh) as own,
+    ):
+        settings = Settings(site="hall", robots=("arm",), folder=tmp_path / "recorded")
+        task = asyncio.create_task(recorder.serve(own, settings))
+        published = {}
+        following = asyncio.create_task(
+            watch(site.session.subscribe(site.key("signals"), newest=1000), published)
+        )
+        try:
+            await until(lambda: published)
+            await site.session.ask(key, ask(action=ask.TRACE_ON), timeout_s=20.0)
+            first = max(published)
+            await until(lambda: max(published) >= first + 12)
+            answer = await site.session.ask(key, ask(action=ask.TRACE_OFF), timeout_s=20.0)
+        finally:
+            for each in (following, task):
+                each.cancel()
+            await asyncio.gather(following, task, return_exceptions=True)
+    published, name = published, answer.file
     with (tmp_path / "recorded" / "arm" / name).open("rb") as stream:
         topic = "robomesh/hall/arm/signals"
         found = {m.sequence: m.data for _, _, m in make_reader(stream).iter_messages(topics=[topic])}

@@ -37,14 +37,11 @@ asyncio.run(supervise(programs, ready=ready, write=write, forked=forked))
 """
 
 
-def test_lines_of_any_length_and_any_bytes_are_read():
-    async def main():
-        stream = asyncio.StreamReader()
-        stream.feed_data(b"one\n" + b"x" * 200_000 + b"\ntw\xff\no\nlast")
-        stream.feed_eof()
-        return [line async for line in _lines(stream)]
-
-    lines = run(main())
+async def test_lines_of_any_length_and_any_bytes_are_read():
+    stream = asyncio.StreamReader()
+    stream.feed_data(b"one\n" + b"x" * 200_000 + b"\ntw\xff\no\nlast")
+    stream.feed_eof()
+    lines = [line async for line in _lines(stream)]
     assert [line[:4] for line in lines] == ["one", "xxxx", "tw\ufffd", "o", "last"]
     assert len(lines[1]) == 2000
 
@@ -80,7 +77,7 @@ def test_only_a_required_program_that_cannot_start_ends_the_others(monkeypatch):
 
 
 @pytest.mark.slow
-def test_extra_programs_start_and_stop_while_the_others_run():
+async def test_extra_programs_start_and_stop_while_the_others_run():
     wanted, log = {}, []
 
     def group(name):
@@ -105,21 +102,18 @@ def test_extra_programs_start_and_stop_while_the_others_run():
         assert logged("two", "listening") == 1
         assert not logged("one", "ended"), "an intended stop is logged as a failure"
 
-    async def main():
-        supervising = asyncio.create_task(
-            supervise(
-                [SupervisedProgram(name="rest", arguments=("simulate", "--listen", "127.0.0.1:0"))],
-                ready=lambda: asyncio.Event().wait(),
-                write=log.append,
-                extra=lambda: dict(wanted),
-            )
+    supervising = asyncio.create_task(
+        supervise(
+            [SupervisedProgram(name="rest", arguments=("simulate", "--listen", "127.0.0.1:0"))],
+            ready=lambda: asyncio.Event().wait(),
+            write=log.append,
+            extra=lambda: dict(wanted),
         )
-        await steps()
-        supervising.cancel()
-        await asyncio.gather(supervising, return_exceptions=True)
-        assert logged("rest", "listening") == 1
-
-    run(main())
+    )
+    await steps()
+    supervising.cancel()
+    await asyncio.gather(supervising, return_exceptions=True)
+    assert logged("rest", "listening") == 1
 
 
 @pytest.mark.slow
@@ -145,7 +139,7 @@ def test_a_blocked_terminal_does_not_block_a_service():
 
 
 @pytest.mark.slow
-def test_a_standby_replaces_a_killed_process(tmp_path, monkeypatch):
+async def test_a_standby_replaces_a_killed_process(tmp_path, monkeypatch):
     monkeypatch.setattr(supervisor, "_STANDBY_AFTER_S", 0.1)
     site = tmp_path / "site.toml"
     site.write_text(f'site = "hall"\n[router]\nlisten = ["tcp/127.0.0.1:{free_port()}"]\n')
@@ -162,24 +156,21 @@ def test_a_standby_replaces_a_killed_process(tmp_path, monkeypatch):
         while not condition():
             await asyncio.sleep(0.02)
 
-    async def main():
-        task = asyncio.create_task(supervise([router], ready=asyncio.Event().wait, write=log.append))
-        await until(lambda: sum("routing on" in line for line in log) == 1)
-        await until(lambda: len(pids()) == 2)
-        serving, standby = pids()
-        os.kill(serving, signal.SIGKILL)
-        await until(lambda: sum("routing on" in line for line in log) == 2)
-        await until(lambda: serving not in pids() and len(pids()) == 2)
-        assert standby in pids()
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-
-    run(main(), timeout_s=60.0)
+    task = asyncio.create_task(supervise([router], ready=asyncio.Event().wait, write=log.append))
+    await until(lambda: sum("routing on" in line for line in log) == 1)
+    await until(lambda: len(pids()) == 2)
+    serving, standby = pids()
+    os.kill(serving, signal.SIGKILL)
+    await until(lambda: sum("routing on" in line for line in log) == 2)
+    await until(lambda: serving not in pids() and len(pids()) == 2)
+    assert standby in pids()
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
     assert not pids()
 
 
 @pytest.mark.slow
-def test_a_temporary_lack_of_processes_ends_no_program(monkeypatch):
+async def test_a_temporary_lack_of_processes_ends_no_program(monkeypatch):
     start, failures, log = supervisor._start, [], []
 
     async def short_of_processes(program, **how):
@@ -197,15 +188,12 @@ def test_a_temporary_lack_of_processes_ends_no_program(monkeypatch):
     def lines(name, words):
         return [line for line in log if line.startswith(name) and words in line]
 
-    async def main():
-        supervising = asyncio.create_task(supervise(programs, ready=asyncio.Event().wait, write=log.append))
-        while not (lines("rest", "listening") and lines("late", "listening")):
-            assert not supervising.done()
-            await asyncio.sleep(0.02)
-        supervising.cancel()
-        await asyncio.gather(supervising, return_exceptions=True)
-
-    run(main())
+    supervising = asyncio.create_task(supervise(programs, ready=asyncio.Event().wait, write=log.append))
+    while not (lines("rest", "listening") and lines("late", "listening")):
+        assert not supervising.done()
+        await asyncio.sleep(0.02)
+    supervising.cancel()
+    await asyncio.gather(supervising, return_exceptions=True)
     assert len(lines("late", "could not be started: Resource temporarily unavailable; restarting in")) == 2
     assert not lines("rest", "ended")
 
