@@ -1,1 +1,1 @@
-"""What runs at a site: the services, the site file, the supervisor, the command line."""
+"""What runs at a site: services, site file, supervisor, command line. No service imports another."""

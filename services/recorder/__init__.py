@@ -1,1 +1,1 @@
-"""Recorder service: captures of a robot's topics as self-contained MCAP files."""
+"""Recorder service: captures of topics as self-contained MCAP files. `reading/` reads what is recorded."""

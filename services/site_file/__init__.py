@@ -1,1 +1,1 @@
-"""The site file's parts, and the file of robots that were started from the page."""
+"""The site file as a whole, and the file of robots that were started from the page."""

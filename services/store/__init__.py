@@ -1,1 +1,1 @@
-"""The store of a site: named programs with all their versions, and programs that ran without being saved."""
+"""The store of a site: programs with all their versions, notes, layouts. It runs no program."""

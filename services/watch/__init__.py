@@ -1,1 +1,1 @@
-"""The watch of a site: its alarms, and the mesh as it sees it."""
+"""The watch of a site: its alarms, and conditions of the mesh. It reports; it commands nothing."""

@@ -1,1 +1,1 @@
-"""`robomesh robot`, `mesh`, `fk` and `ik`: descriptions and kinematics, without a running mesh."""
+"""`robomesh robot`, `shapes`, `fk` and `ik`: descriptions and kinematics, without a running mesh."""

@@ -1,1 +1,1 @@
-"""`robomesh up`, and the commands that run one service of a site."""
+"""Commands that run: a whole site, one of its services, a bridge, a simulated controller."""

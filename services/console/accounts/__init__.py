@@ -1,1 +1,1 @@
-"""The console's accounts: roles, passwords, sessions and rights."""
+"""The console's accounts: roles, passwords, sessions, rights, and their HTTP routes."""

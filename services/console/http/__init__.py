@@ -1,1 +1,1 @@
-"""The console's HTTP routes and connections."""
+"""The page's HTTP routes: files, pictures, video, shapes, recordings. Not accounts and Define."""
