@@ -11,7 +11,8 @@ import { robotSnapshot, useFleetSnapshots } from "../../mesh/state/robot-snapsho
 import type { StateWord } from "../../mesh/state/robot-state";
 import { stateWord } from "../../mesh/state/robot-state";
 import { isClockOff, isMeshStale, isSilent, reportAge, useMesh } from "../../mesh/state/site-health";
-import { ageOf, now } from "../../mesh/state/topics";
+import { ageOf } from "../../mesh/state/staleness";
+import { now } from "../../mesh/state/topics";
 import { AliveServices } from "../../panels/alive-services";
 import { Button } from "../../ui/button";
 import { Select } from "../../ui/select";

@@ -7,8 +7,8 @@ import { ProgramState_Outcome as Outcome } from "../../gen/robomesh_pb";
 import { clock, staleText } from "../../i18n/format";
 import { reasonText } from "../../i18n/reasons";
 import { t } from "../../i18n/texts";
+import { ageOf, isStale } from "../../mesh/state/staleness";
 import type { Latest } from "../../mesh/state/topics";
-import { ageOf, isStale } from "../../mesh/state/topics";
 
 const SHOWN_MS = 60_000; // after its end
 const ENDS = new Set(["program.done", "program.ended"]);

@@ -11,7 +11,8 @@ import { durationS, lostText, messagesOf, momentText, sizeText, startedText } fr
 import { recordingsText as r, viewText } from "../../i18n/texts";
 import { presence } from "../../mesh/console/connection";
 import { Action, askRecorder } from "../../mesh/services/recorder";
-import { ageOf, isStale, useTopic } from "../../mesh/state/topics";
+import { ageOf, isStale } from "../../mesh/state/staleness";
+import { useTopic } from "../../mesh/state/topics";
 import { viewsOf } from "../../scene/scene-view";
 import { Button } from "../../ui/button";
 import { useOutcome } from "../../ui/outcome";

@@ -10,8 +10,8 @@ import { ageText } from "../../i18n/format";
 import { t, viewText } from "../../i18n/texts";
 import { ageClock } from "../console/age-clock";
 import type { Sample } from "../console/connection";
+import { isStale, jointsAge } from "../state/staleness";
 import type { Latest } from "../state/topics";
-import { isStale, jointsAge } from "../state/topics";
 
 /** The page's own drawing, among the names of views. */
 export const OWN_DRAWING = "3d";

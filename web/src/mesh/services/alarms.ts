@@ -13,8 +13,8 @@ import {
 import { stampMs } from "../../i18n/format";
 import { ask, hello, watch } from "../console/connection";
 import { operator } from "../control/control";
+import { ageOf, isStale } from "../state/staleness";
 import type { Latest } from "../state/topics";
-import { ageOf, isStale } from "../state/topics";
 
 export type { Alarm };
 export { Action, Priority, State };

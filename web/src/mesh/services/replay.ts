@@ -8,7 +8,8 @@ import type { ReplayState } from "../../gen/robomesh_pb";
 import { ReplayRequest_Action as Action, ReplayRequestSchema, ReplayStateSchema } from "../../gen/robomesh_pb";
 import { stampMs } from "../../i18n/format";
 import { ask, reasonOf, watch } from "../console/connection";
-import { isStale, now } from "../state/topics";
+import { isStale } from "../state/staleness";
+import { now } from "../state/topics";
 
 export const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20, 50, 100] as const;
 const TIMEOUT_S = 5;

@@ -16,8 +16,8 @@ import { isOfKind, reasonsText, reasonText } from "../../i18n/reasons";
 import { operatorText } from "../../i18n/stop-words";
 import type { TextName } from "../../i18n/texts";
 import { t } from "../../i18n/texts";
+import { ageOf, isStale } from "./staleness";
 import type { Latest } from "./topics";
-import { ageOf, isStale } from "./topics";
 
 /** Level of attention; each has its own colour and shape. */
 export type Level = "normal" | "warning" | "alarm";

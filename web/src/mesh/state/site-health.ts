@@ -2,8 +2,9 @@
 
 import type { MeshState, MeshState_Seen as Seen } from "../../gen/robomesh_pb";
 import { MeshStateSchema } from "../../gen/robomesh_pb";
+import { ageOf, isStale } from "./staleness";
 import type { Latest } from "./topics";
-import { ageOf, isStale, useTopics } from "./topics";
+import { useTopics } from "./topics";
 
 /** s: with a larger offset, times of two machines cannot be compared by eye. */
 export const CLOCK_OFF_S = 0.5;

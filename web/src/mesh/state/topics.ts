@@ -1,4 +1,4 @@
-// What the page knows of the mesh: the newest message by key, and its age.
+// The newest message of each key that the page has subscribed to.
 
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
 import { equals, fromBinary } from "@bufbuild/protobuf";
@@ -6,12 +6,12 @@ import type { Timestamp } from "@bufbuild/protobuf/wkt";
 import type { Signal } from "@preact/signals";
 import { signal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
-import type { AuditEntry, ControllerState, Description, Event } from "../../gen/robomesh_pb";
+import type { AuditEntry, Event } from "../../gen/robomesh_pb";
 import { AuditEntrySchema, AuditListSchema, EventListSchema, EventSchema } from "../../gen/robomesh_pb";
 import { stampMs } from "../../i18n/format";
 import { ageClock } from "../console/age-clock";
 import type { Sample } from "../console/connection";
-import { hello, watch } from "../console/connection";
+import { watch } from "../console/connection";
 
 export interface Latest<M> {
   key: string;
@@ -163,42 +163,4 @@ function useList<M extends Dated>(
 function goesOn(last: Sample, sample: Sample, count: number): boolean {
   const more = sample.sequence - last.sequence;
   return sample.live || (sample.publisher === last.publisher && more >= BigInt(count) && more > 0n);
-}
-
-/** Return the age [s] of a sample now; null: not known. */
-export function ageOf(latest: Latest<unknown> | undefined, at = now.value): number | null {
-  if (!latest || latest.sample.newAt === null) return null;
-  return Math.max(0, (at - latest.sample.newAt) / 1000);
-}
-
-/** Return the age [s] of joint states, including the gateway's report of its last unit's age; null: not known. */
-export function jointsAge(
-  joints: Latest<unknown> | undefined,
-  controller: Latest<ControllerState> | undefined,
-  at = now.value,
-): number | null {
-  if (!joints) return null;
-  const own = ageOf(joints, at);
-  const reportAge = ageOf(controller, at);
-  const lastUnit = controller?.message.lastUnitAgeS;
-  if (reportAge === null || lastUnit === undefined || controller === undefined) return own;
-  const reported = reportAge + lastUnit;
-  if (own === null) return reported;
-  // A report from before the newest states does not describe them.
-  return controller.sample.arrived >= joints.sample.arrived ? Math.max(own, reported) : own;
-}
-
-// Topics with the joints, and those computed from them: a robot may have another stale time.
-const OF_ARM: readonly string[] = ["joints", "joints/slow", "frames", "kinematics"];
-
-/** Return the age [s] at which a robot's topic is stale; infinite if it does not expire. */
-export function staleAfter(topic: string, description?: Description): number {
-  if (description?.staleAfterS !== undefined && OF_ARM.includes(topic)) return description.staleAfterS;
-  const rows = hello.value?.stale ?? [];
-  const row = rows.find((r) => r.topic === topic) ?? rows.find((r) => r.topic === topic.replace(/\/.*/, "/*"));
-  return row?.afterS ?? Number.POSITIVE_INFINITY;
-}
-
-export function isStale(topic: string, age: number | null, description?: Description): boolean {
-  return age === null || age > staleAfter(topic, description);
 }

@@ -8,7 +8,8 @@ import { RecordingListSchema, RecordingSchema } from "../../../gen/robomesh_pb";
 import { startMs } from "../../../i18n/recording-format";
 import { recordingsText as r } from "../../../i18n/texts";
 import { AskError, ask, hello, lostAt, presence, reasonOf } from "../../../mesh/console/connection";
-import { ageOf, isStale, useTopics } from "../../../mesh/state/topics";
+import { ageOf, isStale } from "../../../mesh/state/staleness";
+import { useTopics } from "../../../mesh/state/topics";
 
 const REFRESH_INTERVAL_MS = 5000;
 const TIMEOUT_S = 10;

@@ -6,8 +6,8 @@ import { count, fixed } from "../../../i18n/format";
 import type { TextName } from "../../../i18n/texts";
 import { t } from "../../../i18n/texts";
 import { Command } from "../../../mesh/control/command";
+import { ageOf, isStale } from "../../../mesh/state/staleness";
 import type { Latest } from "../../../mesh/state/topics";
-import { ageOf, isStale } from "../../../mesh/state/topics";
 import { recoveryNames } from "../../../panels/control/recover";
 import { Unit } from "../../../ui/unit";
 

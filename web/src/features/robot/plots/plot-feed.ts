@@ -7,7 +7,7 @@ import { SeriesAnswerSchema, SeriesRequestSchema } from "../../../gen/robomesh_p
 import { plotsText as p } from "../../../i18n/texts";
 import { ageClock } from "../../../mesh/console/age-clock";
 import { AskError, ask, inOwnName, presence, reasonOf, watch } from "../../../mesh/console/connection";
-import { staleAfter } from "../../../mesh/state/topics";
+import { staleAfter } from "../../../mesh/state/staleness";
 import { learnUnit, readerOf, topicOf, topicsOfValues } from "../../../mesh/state/values";
 import { Buckets } from "./plot-buckets";
 
