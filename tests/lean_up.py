@@ -8,7 +8,7 @@ import sys
 from dataclasses import replace
 
 from services.command_line.main import main
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.table import SERVICES
 from services.command_line.site import up
 
 

@@ -28,12 +28,12 @@ from controllers.opcua import facts
 from controllers.opcua.driver import OPCUA, OpcUaDriver
 from controllers.universal_robots.interfaces import dashboard, packages, primary, rtde_messages
 from controllers.yaskawa import hses
-from protocol_gateway.authority.entry import chain_link, parse_line
-from protocol_gateway.core.grammar import type_code
-from protocol_gateway.core.records import read_number, speed_percent
-from protocol_gateway.core.stream import Unit, UnitStream
+from protocol_gateway.authority.audit_entry import chain_link, parse_line
 from protocol_gateway.driver_parts import pendant_text, signal_names
 from protocol_gateway.legacy.requests import requests_of
+from protocol_gateway.unit_protocol.grammar import type_code
+from protocol_gateway.unit_protocol.records import read_number, speed_percent
+from protocol_gateway.unit_protocol.stream import Unit, UnitStream
 from robomesh import reasons, texts
 from robomesh.contract import keys, messages
 from robomesh.contract.topics import REQUESTS

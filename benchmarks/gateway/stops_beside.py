@@ -45,7 +45,7 @@ from robomesh.contract.endpoints import bundle
 from robomesh.contract.topics import Role
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 
 ROBOTS = ("arm", "other")
 IN_TRANSIT_NS = 100_000_000
@@ -185,11 +185,11 @@ def site(*, with_keys: bool) -> Iterator[tuple[Mesh, Any]]:
     def prepare(site: Site) -> None:
         if with_keys:
             keys = Folder(site.folder / "keys")
-            authority.prepare(keys, "bench", robots=list(ROBOTS), border="open", routers=[site.endpoint])
-            authority.issue(keys, HONEST, Role.OPERATOR)
+            site_keys.prepare(keys, "bench", robots=list(ROBOTS), border="open", routers=[site.endpoint])
+            site_keys.issue(keys, HONEST, Role.OPERATOR)
             for role, people in FLOODERS.items():
                 for person in people:
-                    authority.issue(keys, person, role)
+                    site_keys.issue(keys, person, role)
 
     with recording_controllers() as (robots, arrivals):
         scheme, tables = ("tls", f'[keys]\nfolder = "keys"\n{robots}') if with_keys else ("tcp", robots)

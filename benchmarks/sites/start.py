@@ -35,7 +35,7 @@ from benchmarks.harness.processes import free_port
 from benchmarks.harness.program import ROOT
 from benchmarks.harness.sites import ROBOMESH
 from robomesh.contract.endpoints import client_config
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.table import SERVICES
 
 SITE = """site = "bench"
 [router]

@@ -10,23 +10,6 @@ from itertools import zip_longest
 from operator import mul
 from types import MappingProxyType
 
-from protocol_gateway.core.codes import code_table
-from protocol_gateway.core.grammar import TERMINATOR
-from protocol_gateway.core.records import (
-    AbsolutePositions,
-    Command,
-    Error,
-    Record,
-    RelativePositions,
-    Status,
-    Time,
-    Unknown,
-    Velocities,
-    write_number,
-    write_unit,
-)
-from protocol_gateway.core.scales import si_scales
-from protocol_gateway.core.stream import Malformed, Unit, UnitStream, printable
 from protocol_gateway.seam import (
     ALL,
     COMMANDS,
@@ -56,6 +39,23 @@ from protocol_gateway.seam import (
     UnknownReceived,
 )
 from protocol_gateway.seam.errors import CommandError, UnitFormatError
+from protocol_gateway.unit_protocol.codes import code_table
+from protocol_gateway.unit_protocol.grammar import TERMINATOR
+from protocol_gateway.unit_protocol.records import (
+    AbsolutePositions,
+    Command,
+    Error,
+    Record,
+    RelativePositions,
+    Status,
+    Time,
+    Unknown,
+    Velocities,
+    write_number,
+    write_unit,
+)
+from protocol_gateway.unit_protocol.scales import si_scales
+from protocol_gateway.unit_protocol.stream import Malformed, Unit, UnitStream, printable
 from robomesh import reason_codes as codes
 from robomesh.texts import one_line
 from robots.kinematics.joints import JointType

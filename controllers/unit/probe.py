@@ -1,8 +1,8 @@
 """How `robomesh probe` knows the unit protocol: these controllers send their state unasked."""
 
 from controllers.probing import Found, Probe
-from protocol_gateway.core.records import AbsolutePositions, Unknown
-from protocol_gateway.core.stream import Unit, UnitStream
+from protocol_gateway.unit_protocol.records import AbsolutePositions, Unknown
+from protocol_gateway.unit_protocol.stream import Unit, UnitStream
 
 
 def _units(heard: bytes) -> tuple[int, int, bool]:

@@ -13,7 +13,7 @@ changes nothing.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from protocol_gateway.authority.entry import Entry, Outcome
+from protocol_gateway.authority.audit_entry import Entry, Outcome
 from protocol_gateway.seam.text_limits import LONGEST_SENTENCE
 from robomesh import reason_codes as codes
 from robomesh.texts import one_line

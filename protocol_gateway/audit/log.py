@@ -36,7 +36,7 @@ from protocol_gateway.audit.persisted_state import (
     with_latched_stop,
 )
 from protocol_gateway.audit.recovery import Recovery, find_end
-from protocol_gateway.authority.entry import GATEWAY, Entry, Outcome, chain_entry
+from protocol_gateway.authority.audit_entry import GATEWAY, Entry, Outcome, chain_entry
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason

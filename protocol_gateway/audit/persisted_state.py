@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from protocol_gateway.audit.latch_file import LatchState
-from protocol_gateway.authority.entry import Entry, Outcome
+from protocol_gateway.authority.audit_entry import Entry, Outcome
 from protocol_gateway.authority.lease_rules import Authority, LatchedStop
 
 ROTATE = "ROTATE"

@@ -23,7 +23,7 @@ from protocol_gateway.audit.persisted_state import (
     may_change_stop,
     starts_file,
 )
-from protocol_gateway.authority.entry import NO_PREVIOUS, chain_link, parse_line
+from protocol_gateway.authority.audit_entry import NO_PREVIOUS, chain_link, parse_line
 from protocol_gateway.seam.errors import AuditError
 
 # Quotes within texts are escaped, so no text matches.

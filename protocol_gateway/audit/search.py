@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from protocol_gateway.audit.files import lines_of, open_files
-from protocol_gateway.authority.entry import Entry, Outcome, audit_entry, parse_line
+from protocol_gateway.authority.audit_entry import Entry, Outcome, audit_entry, parse_line
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
 from robomesh.contract.enum_names import enum_name

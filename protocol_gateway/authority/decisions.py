@@ -19,7 +19,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias, TypeVar
 
-from protocol_gateway.authority.entry import Entry
+from protocol_gateway.authority.audit_entry import Entry
 from protocol_gateway.authority.lease_rules import Answer, LatchedStop, Now
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.checking.worker_messages import Positions

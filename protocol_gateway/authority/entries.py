@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from hashlib import sha256
 
-from protocol_gateway.authority.entry import GATEWAY, Entry, Outcome
+from protocol_gateway.authority.audit_entry import GATEWAY, Entry, Outcome
 from protocol_gateway.authority.events import (
     CommandsRequested,
     JogEnded,

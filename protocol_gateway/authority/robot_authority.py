@@ -35,8 +35,8 @@ from protocol_gateway.authority import (
     stop_rules,
 )
 from protocol_gateway.authority.admission import Verdict, keep_answer
+from protocol_gateway.authority.audit_entry import GATEWAY, Outcome
 from protocol_gateway.authority.decisions import CheckResult, Decisions, Snapshot
-from protocol_gateway.authority.entry import GATEWAY, Outcome
 from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.events import LeaseResult, StopResult
 from protocol_gateway.authority.lease_rules import Answer, Authority, LeaseEnd, Now, not_sent, refused

@@ -14,12 +14,9 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping
 
+from protocol_gateway.authority.audit_entry import Entry, Outcome
 from protocol_gateway.authority.entries import entry_of
-from protocol_gateway.authority.entry import Entry, Outcome
-from protocol_gateway.control.control import Control
-from protocol_gateway.core.codes import code_table
-from protocol_gateway.core.records import Error, write_unit
-from protocol_gateway.core.stream import Malformed, StreamEvent, Unit, printable
+from protocol_gateway.execution.control import Control
 from protocol_gateway.legacy.commander import Commander
 from protocol_gateway.legacy.requests import (
     FAULT,
@@ -32,6 +29,9 @@ from protocol_gateway.legacy.requests import (
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
 from protocol_gateway.serving.client import Client
 from protocol_gateway.telemetry.journal import Journal
+from protocol_gateway.unit_protocol.codes import code_table
+from protocol_gateway.unit_protocol.records import Error, write_unit
+from protocol_gateway.unit_protocol.stream import Malformed, StreamEvent, Unit, printable
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.health import listen_when_possible

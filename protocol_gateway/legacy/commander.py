@@ -15,11 +15,11 @@ from contextlib import suppress
 from protocol_gateway.authority.admission import LONGEST_WAIT_S
 from protocol_gateway.authority.events import LeaseEnded
 from protocol_gateway.authority.lease_rules import holds
-from protocol_gateway.control.clocks import read_clocks
-from protocol_gateway.control.control import Control
-from protocol_gateway.core.records import Error
-from protocol_gateway.core.stream import Unit
+from protocol_gateway.execution.clocks import read_clocks
+from protocol_gateway.execution.control import Control
 from protocol_gateway.legacy.requests import FAULT, READ_ONLY, number_of, requests_of, stop_to_reset
+from protocol_gateway.unit_protocol.records import Error
+from protocol_gateway.unit_protocol.stream import Unit
 from robomesh.errors import RefusedError
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest

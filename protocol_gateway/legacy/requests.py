@@ -8,7 +8,9 @@ anything else                               refused
 from collections.abc import Sequence
 
 from protocol_gateway.authority.lease_rules import Answer, Authority
-from protocol_gateway.core.records import (
+from protocol_gateway.seam import Recovery
+from protocol_gateway.seam.errors import UnitError
+from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Command,
     Error,
@@ -20,9 +22,7 @@ from protocol_gateway.core.records import (
     Velocities,
     speed_percent,
 )
-from protocol_gateway.core.scales import si_scales
-from protocol_gateway.seam import Recovery
-from protocol_gateway.seam.errors import UnitError
+from protocol_gateway.unit_protocol.scales import si_scales
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest
 from robots.kinematics.joints import Joints

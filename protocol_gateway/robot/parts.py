@@ -12,7 +12,7 @@ from protocol_gateway.checking.policy import Policy
 from protocol_gateway.configuration.controller_proofs import ControllerProofs
 from protocol_gateway.configuration.kinds import driver_maker
 from protocol_gateway.configuration.settings import RobotSettings
-from protocol_gateway.control.motion_checks import MotionChecks
+from protocol_gateway.execution.motion_checks import MotionChecks
 from protocol_gateway.link.link import LinkSettings
 from protocol_gateway.seam import Driver
 from protocol_gateway.seam.errors import GatewaySettingsError

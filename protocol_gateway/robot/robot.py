@@ -12,16 +12,16 @@ from protocol_gateway.audit.log import AuditLog, Entry
 from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
 from protocol_gateway.authority import events
-from protocol_gateway.authority.entry import audit_entry
+from protocol_gateway.authority.audit_entry import audit_entry
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import HEED_TIMEOUT_S
 from protocol_gateway.configuration.settings import RobotSettings
-from protocol_gateway.control.audit_trail import AuditTrail
-from protocol_gateway.control.clocks import read_clocks
-from protocol_gateway.control.control import Control, Performers
-from protocol_gateway.control.jog_runner import JogRunner
-from protocol_gateway.control.mesh_requests import MeshRequests
-from protocol_gateway.control.program_runner import ProgramRunner
+from protocol_gateway.execution.audit_trail import AuditTrail
+from protocol_gateway.execution.clocks import read_clocks
+from protocol_gateway.execution.control import Control, Performers
+from protocol_gateway.execution.jog_runner import JogRunner
+from protocol_gateway.execution.mesh_requests import MeshRequests
+from protocol_gateway.execution.program_runner import ProgramRunner
 from protocol_gateway.legacy.clients import LegacyClients
 from protocol_gateway.link.link import (
     JOINT_COUNT,

@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from datetime import timedelta
 
 from robomesh.contract.topics import PEOPLE
-from services.pki.authority import exclusive, issued, now, principals_of, save
 from services.pki.errors import KeysError
 from services.pki.folder import Folder
 from services.pki.principals import Entry, Principals
+from services.pki.site_keys import exclusive, issued, now, principals_of, save
 
 RENEW_WITHIN = timedelta(days=10)
 

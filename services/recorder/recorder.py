@@ -29,7 +29,7 @@ from services.recorder.events import EventReporter, report_disk
 from services.recorder.file_writer import CaptureSink
 from services.recorder.finishing import Finisher, Job
 from services.recorder.flight import FlightRecorder
-from services.recorder.orphans import left_state, lock_folder
+from services.recorder.left_files import left_state, lock_folder
 from services.recorder.reading.serving import RecordingServer
 from services.recorder.reading.uses import RecordingUses
 from services.recorder.settings import Settings

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from protocol_gateway.configuration.kinds import own_kinds
-from services.command_line.services.table import SERVICES, Options
+from services.command_line.service_settings.table import SERVICES, Options
 from services.site_file.site import load
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from protocol_gateway.core import stream
-from protocol_gateway.core.records import AbsolutePositions
+from protocol_gateway.unit_protocol import stream
+from protocol_gateway.unit_protocol.records import AbsolutePositions
 from tests.fuzz import fuzz_units as fuzzer
 
 

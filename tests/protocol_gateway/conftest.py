@@ -5,7 +5,7 @@ import time
 import pytest
 
 from protocol_gateway.authority.lease_rules import Now
-from protocol_gateway.control import control
+from protocol_gateway.execution import control
 
 
 def later(now, seconds):

@@ -7,8 +7,8 @@ from protocol_gateway.audit.log import AuditLog, read_entries
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
-from protocol_gateway.control.audit_trail import AuditTrail
-from protocol_gateway.control.control import Control, Performers
+from protocol_gateway.execution.audit_trail import AuditTrail
+from protocol_gateway.execution.control import Control, Performers
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from protocol_gateway.seam.errors import LinkDownError

@@ -3,9 +3,9 @@
 import asyncio
 import contextlib
 
-from protocol_gateway.core.records import AbsolutePositions, Error, Status
-from protocol_gateway.core.stream import Malformed, UnitStream
 from protocol_gateway.legacy.settings import LegacySettings
+from protocol_gateway.unit_protocol.records import AbsolutePositions, Error, Status
+from protocol_gateway.unit_protocol.stream import Malformed, UnitStream
 from tests.conftest import free_port
 from tests.protocol_gateway.gateway_site import gateway, simulator, until
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from protocol_gateway.control.clocks import read_clocks
+from protocol_gateway.execution.clocks import read_clocks
 from robomesh.contract.messages import PROTOBUF
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema

@@ -9,7 +9,7 @@ import pytest
 
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.policy import Policy
-from protocol_gateway.control.motion_checks import MotionChecks
+from protocol_gateway.execution.motion_checks import MotionChecks
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError

@@ -1,8 +1,14 @@
 import pytest
 
-from protocol_gateway.core.codes import NAMES, code_table
-from protocol_gateway.core.records import AbsolutePositions, Command, Unknown, read_records, write_unit
 from protocol_gateway.seam.errors import CodeTableError, UnitError
+from protocol_gateway.unit_protocol.codes import NAMES, code_table
+from protocol_gateway.unit_protocol.records import (
+    AbsolutePositions,
+    Command,
+    Unknown,
+    read_records,
+    write_unit,
+)
 
 TABLE = {2: "ABSOLUTE.DEG", 101: "COMMAND:home", 107: "COMMAND:speed", -9: "FORCE"}
 

@@ -1,6 +1,6 @@
 """Times of arrival of commands at a gateway that does not always run."""
 
-from protocol_gateway.control.deadlines import CommandArrivals
+from protocol_gateway.execution.deadlines import CommandArrivals
 
 
 def test_commands_arrive_when_they_are_received_while_the_gateway_runs():

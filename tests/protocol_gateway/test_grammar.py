@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.core.grammar import RawRecord, format_unit, parse_unit, plain_text, type_code
 from protocol_gateway.seam.errors import UnitError, UnitFormatError
+from protocol_gateway.unit_protocol.grammar import RawRecord, format_unit, parse_unit, plain_text, type_code
 
 PAPER = b"2# COMMAND* trace; home&ABSOLUTE.DEG* 100.00; 30.45; 92.66; - 67.10; - 25.85@"
 

@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from protocol_gateway.authority.events import LeaseEnded, MotionObserved
 from protocol_gateway.authority.lease_rules import Authority, LatchedStop
 from protocol_gateway.authority.preconditions import ControllerState
-from protocol_gateway.core.records import Error, read_records, write_unit
-from protocol_gateway.core.stream import Unit, UnitStream
 from protocol_gateway.legacy.requests import (
     asks_for_more,
     asks_to_stop,
@@ -30,6 +28,8 @@ from protocol_gateway.seam import (
     Recovery,
     StatusReceived,
 )
+from protocol_gateway.unit_protocol.records import Error, read_records, write_unit
+from protocol_gateway.unit_protocol.stream import Unit, UnitStream
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover
 from robots.descriptions.description import load

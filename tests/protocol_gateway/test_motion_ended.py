@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from protocol_gateway.authority.entry import GATEWAY
+from protocol_gateway.authority.audit_entry import GATEWAY
 from protocol_gateway.authority.events import MotionObserved, StatusReported
 from protocol_gateway.authority.lease_rules import Authority, Now, end_lease, request_lease
 from protocol_gateway.authority.motion_owner import command_sent, observe, reported

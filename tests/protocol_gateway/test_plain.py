@@ -2,10 +2,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from protocol_gateway.core.codes import NAMES, code_table
-from protocol_gateway.core.plain import plain_readers, read_plain
-from protocol_gateway.core.records import read_records
 from protocol_gateway.seam.errors import UnitError
+from protocol_gateway.unit_protocol.codes import NAMES, code_table
+from protocol_gateway.unit_protocol.plain import plain_readers, read_plain
+from protocol_gateway.unit_protocol.records import read_records
 
 OWN = code_table({2: "ABSOLUTE.DEG", -9: "TIME", 12: "OVEN", 101: "COMMAND:home"})
 TABLES = {"names": NAMES, "codes of its own": OWN}

@@ -14,7 +14,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from protocol_gateway.authority.lease_rules import Now
 from protocol_gateway.checking.checker import Checker
-from protocol_gateway.control.deadlines import set_deadline
+from protocol_gateway.execution.deadlines import set_deadline
 from protocol_gateway.seam.errors import CheckError
 from robomesh import reason_codes as codes
 from robomesh.contract.activity import activity_words

@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.core.codes import NAMES, code_table
-from protocol_gateway.core.grammar import plain_text
-from protocol_gateway.core.records import (
+from protocol_gateway.seam.errors import UnitError, UnitFormatError
+from protocol_gateway.unit_protocol.codes import NAMES, code_table
+from protocol_gateway.unit_protocol.grammar import plain_text
+from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Command,
     Error,
@@ -21,7 +22,6 @@ from protocol_gateway.core.records import (
     write_number,
     write_unit,
 )
-from protocol_gateway.seam.errors import UnitError, UnitFormatError
 
 BOTH_WAYS = [
     (Command(("trace", "home")), b"1#COMMAND*trace;home@"),

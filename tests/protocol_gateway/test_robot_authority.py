@@ -11,7 +11,7 @@ from protocol_gateway.authority.decisions import CheckResult, PlannedProgram, Sn
 from protocol_gateway.authority.lease_rules import Authority, Now
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
-from protocol_gateway.control.control import Control, Performers
+from protocol_gateway.execution.control import Control, Performers
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes

@@ -3,7 +3,7 @@
 import asyncio
 
 from protocol_gateway.audit.log import read_entries
-from protocol_gateway.authority.entry import Outcome
+from protocol_gateway.authority.audit_entry import Outcome
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from protocol_gateway.control import clocks
+from protocol_gateway.execution import clocks
 from robomesh.errors import RefusedError
 from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 

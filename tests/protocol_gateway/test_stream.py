@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocol_gateway.core.records import AbsolutePositions, Command
-from protocol_gateway.core.stream import LONGEST_UNIT_BYTES, Malformed, Unit, UnitStream
+from protocol_gateway.unit_protocol.records import AbsolutePositions, Command
+from protocol_gateway.unit_protocol.stream import LONGEST_UNIT_BYTES, Malformed, Unit, UnitStream
 from tests.protocol_gateway.test_grammar import PAPER
 
 HOME = b"1#COMMAND*home@"

@@ -16,7 +16,7 @@ from robomesh.contract.certificate_identity import read_identity
 from robomesh.contract.endpoints import router_config
 from robomesh.contract.topics import Role
 from robomesh.wire.session import Session
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from tests.conftest import free_port
 from tests.site import ONE_ARM, lean, running_file, site_file, wait_until
 from tests.site import robomesh as command
@@ -44,14 +44,14 @@ def folder(tmp_path_factory):
     ):
         made = command("keys", *words)
         assert made.returncode == 0, made.stderr
-    authority.issue(keys, "brief", Role.OPERATOR, lifetime=timedelta(seconds=1))
+    site_keys.issue(keys, "brief", Role.OPERATOR, lifetime=timedelta(seconds=1))
     with running_file(path, f"tls/127.0.0.1:{port}", page, **lean(())):
         yield keys
 
 
 @pytest.fixture(scope="module")
 def router(folder):
-    return authority.principals_of(folder).routers[0]
+    return site_keys.principals_of(folder).routers[0]
 
 
 @pytest.fixture
@@ -153,8 +153,8 @@ def parts(bundle):
 def stranger(tmp_path_factory):
     """Return the keys of another site, with an operator of the same name."""
     keys = Folder(tmp_path_factory.mktemp("stranger") / "keys")
-    authority.prepare(keys, "elsewhere", robots=["arm"], border="open", routers=[])
-    authority.issue(keys, "li", Role.OPERATOR)
+    site_keys.prepare(keys, "elsewhere", robots=["arm"], border="open", routers=[])
+    site_keys.issue(keys, "li", Role.OPERATOR)
     return keys
 
 

@@ -9,7 +9,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.cells.content import version_of
 from services.cells.file import CellFile
-from services.command_line.services.table import SERVICES, Options
+from services.command_line.service_settings.table import SERVICES, Options
 from services.kinematics import serve as serve_kinematics
 from services.site_file.site import load
 from tests.conftest import last_value

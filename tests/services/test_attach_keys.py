@@ -12,7 +12,7 @@ from robomesh.contract.topics import Role
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import MONITOR
 from robomesh.wire.session import SessionSettings, open_session
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.ros2.service import serve as serve_ros2
 from services.ros2.settings import Settings as Ros2Settings
 from services.router.router import read_access
@@ -26,9 +26,9 @@ from tests.services.test_foxglove import ARM, bridge, joints
 def secured(tmp_path_factory):
     """Return the keys and the router of a running site."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
-    authority.prepare(folder, "hall", robots=["arm"], border="open", routers=[])
-    authority.issue(folder, "mo", Role.MONITOR)
-    authority.issue(folder, "li", Role.OPERATOR)
+    site_keys.prepare(folder, "hall", robots=["arm"], border="open", routers=[])
+    site_keys.issue(folder, "mo", Role.MONITOR)
+    site_keys.issue(folder, "li", Role.OPERATOR)
     endpoint = f"tls/127.0.0.1:{free_port()}"
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
         yield folder, endpoint

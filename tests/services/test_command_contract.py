@@ -15,7 +15,7 @@ import pytest
 from services.command_line import main
 from services.command_line.commands import COMMANDS, load
 from services.command_line.main import run
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.table import SERVICES
 from services.site_file.site import Site
 from services.site_file.tables.console import Console
 from services.site_file.tables.router import Router

@@ -17,7 +17,7 @@ from robomesh.contract.endpoints import router_config
 from robomesh.wire.session import SessionSettings
 from robots.descriptions.description import LIBRARY, load
 from robots.descriptions.save_description import read_robot, write_folder
-from services.command_line.services.table import Options
+from services.command_line.service_settings.table import Options
 from services.command_line.site import launch
 from services.console.common.errors import RefusedRequest
 from services.console.define import routes, store

@@ -18,7 +18,7 @@ from robomesh.contract.topics import Role
 from robots.descriptions.description import library_names
 from services.command_line import main
 from services.command_line.site import up
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.pki.errors import KeysError
 from services.router.router import read_access
 from services.site_file.site import load
@@ -158,12 +158,12 @@ def test_started_robots_keep_running_when_the_rules_cannot_be_written(site, tmp_
     started = tmp_path / "robots" / "started.toml"
     started.parent.mkdir()
     started.write_text('site = "hall"' + ONE_ARM.replace('"arm"', '"mine"'))
-    authority.entitle(folder, ["mine"])
+    site_keys.entitle(folder, ["mine"])
 
     def full(*_):
         raise KeysError(f"{folder.principals}: cannot be written: no space left on device")
 
-    monkeypatch.setattr(authority, "save", full)
+    monkeypatch.setattr(site_keys, "save", full)
     following = up._Started(load(site), site, load(site).listened[0])
     assert [key[0] for key in following.wanted()] == ["mine"]
     assert "no space left on device; started robots run" in caplog.text
@@ -245,7 +245,7 @@ def test_issue_for_an_existing_name_reports_the_earlier_certificate(site, capsys
 
 def test_keys_are_found_by_site_file_or_folder_or_own_bundle_and_printed(tmp_path, monkeypatch, capsys):
     for name in ("keys", "other", "third"):
-        authority.prepare(Folder(tmp_path / name), name, robots=[], border="open", routers=[])
+        site_keys.prepare(Folder(tmp_path / name), name, robots=[], border="open", routers=[])
     work = tmp_path / "work"
     work.mkdir()
     monkeypatch.chdir(work)
@@ -304,7 +304,7 @@ def test_without_the_authoritys_key_rules_are_written_but_nothing_is_issued(site
     assert keys("issue", "mo", "--role", "monitor") == 2
     assert "the authority's key is needed to sign; restore it first" in capsys.readouterr().err
     assert keys("revoke", "li") == 0
-    assert authority.principals_of(folder).find("li").revoked is not None
+    assert site_keys.principals_of(folder).find("li").revoked is not None
 
 
 def test_an_invalid_list_is_reported_with_its_file_and_key(site, capsys):
@@ -329,11 +329,11 @@ def test_a_time_without_zone_is_reported(site, capsys):
 def test_init_repairs_an_init_that_was_killed_before_it_wrote_the_list(site):
     keys("init", str(site))
     folder = Folder(site.parent / "keys")
-    whole = authority.principals_of(folder)
+    whole = site_keys.principals_of(folder)
     folder.principals.unlink()
     folder.access.unlink()
     assert keys("init", str(site)) == 0
-    again = authority.principals_of(folder)
+    again = site_keys.principals_of(folder)
     assert [each.name for each in again.entries] == [each.name for each in whole.entries]
     known = json.dumps(read_access(folder.access)["access_control"]["subjects"])
     assert all(each.name in known and each.serial for each in again.entries)
@@ -348,7 +348,7 @@ def test_a_revoked_name_is_not_issued_while_its_certificate_is_valid(made, monke
     for role in ("operator", "monitor"):
         assert keys("issue", "wang", "--role", role) == 2
         assert "would be admitted again; issue wang-2 in its place" in (error := capsys.readouterr().err)
-    listed = authority.principals_of(Folder(made / "keys")).find("wang")
+    listed = site_keys.principals_of(Folder(made / "keys")).find("wang")
     assert listed.good_until - listed.expires > timedelta(days=88)
     assert f"is valid until {listed.good_until:%Y-%m-%d %H:%M} UTC" in error
     assert keys("renew", "wang") == 2
@@ -357,35 +357,35 @@ def test_a_revoked_name_is_not_issued_while_its_certificate_is_valid(made, monke
 
 def test_a_revoked_name_is_issued_after_its_certificates_have_expired(made):
     folder = Folder(made / "keys")
-    authority.issue(folder, "zhou", Role.OPERATOR, lifetime=timedelta(seconds=-60))
-    authority.revoke(folder, "zhou")
-    assert authority.issue(folder, "zhou", Role.MONITOR).revoked is None
+    site_keys.issue(folder, "zhou", Role.OPERATOR, lifetime=timedelta(seconds=-60))
+    site_keys.revoke(folder, "zhou")
+    assert site_keys.issue(folder, "zhou", Role.MONITOR).revoked is None
 
 
 def test_a_revoked_guest_is_refused_with_a_new_file_and_with_its_sites_file(tmp_path):
     here, there = Folder(tmp_path / "here"), Folder(tmp_path / "there")
     for folder in (here, there):
-        authority.prepare(folder, folder.path.name, robots=[], border="open", routers=[])
-    authority.issue_guest(here, "there")
-    authority.issue_guest(there, "here")
-    authority.revoke(here, "router.there")
+        site_keys.prepare(folder, folder.path.name, robots=[], border="open", routers=[])
+    site_keys.issue_guest(here, "there")
+    site_keys.issue_guest(there, "here")
+    site_keys.revoke(here, "router.there")
     with pytest.raises(KeysError, match="only a new authority excludes the old certificate"):
-        authority.issue_guest(here, "there")
+        site_keys.issue_guest(here, "there")
     with pytest.raises(KeysError, match="would be admitted again"):
-        authority.accept(here, there.guest("here").read_bytes())
+        site_keys.accept(here, there.guest("here").read_bytes())
     assert "router.there" not in here.access.read_text()
 
 
 def test_concurrent_changes_of_the_authority_are_all_kept(made):
     folder = Folder(made / "keys")
-    authority.issue(folder, "thief", Role.OPERATOR)
+    site_keys.issue(folder, "thief", Role.OPERATOR)
     several = [f"p{number}" for number in range(12)]
     with ThreadPoolExecutor(4) as pool:
-        done = [pool.submit(authority.issue, folder, name, Role.MONITOR) for name in several]
-        done.append(pool.submit(authority.revoke, folder, "thief"))
+        done = [pool.submit(site_keys.issue, folder, name, Role.MONITOR) for name in several]
+        done.append(pool.submit(site_keys.revoke, folder, "thief"))
         for each in done:
             each.result()
-    principals, rules = authority.principals_of(folder), folder.access.read_text()
+    principals, rules = site_keys.principals_of(folder), folder.access.read_text()
     assert all(principals.find(name) and f'"{name}.hall"' in rules for name in several)
     assert "thief.hall" not in rules
 
@@ -461,7 +461,7 @@ def test_doctor_tries_every_certificate_and_finds_deviations_of_a_router(site, c
 @pytest.mark.processes
 def test_a_site_with_keys_runs_over_tls(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    authority.prepare(Folder(tmp_path / "keys"), "test", robots=[], border="open", routers=[])
+    site_keys.prepare(Folder(tmp_path / "keys"), "test", robots=[], border="open", routers=[])
     assert keys("issue", "mo", "--role", "monitor") == 0
     more = '[keys]\nfolder = "keys"\n'
     with running_site(tmp_path, robots="", more=more, services=["recorder"]) as site:

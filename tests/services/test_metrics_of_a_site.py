@@ -7,14 +7,14 @@ import pytest
 
 from robomesh.errors import ListenError
 from services.command_line.main import run
-from services.command_line.services.metrics_ports import (
+from services.command_line.service_settings.metrics_ports import (
     extra_with_metrics,
     first_address,
     own_address,
     scrape_config,
     with_metrics,
 )
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.table import SERVICES
 from services.command_line.site.up import programs
 from services.errors import SiteFileError
 from services.site_file import site as site_file

@@ -29,7 +29,7 @@ from services import kinematics, player
 from services.command_line.watch.listing import _Clocks, _collect
 from services.console import app
 from services.foxglove import server as foxglove
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.recorder import recorder
 from services.ros2 import service as ros2
 from services.router.router import read_access
@@ -156,9 +156,9 @@ def site(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     if request.param == "with keys":
         keys = Folder(folder / "keys")
-        authority.prepare(keys, SITE, robots=["arm"], border="open", routers=[])
-        authority.issue(keys, "li", Role.OPERATOR)
-        authority.issue(keys, "mo", Role.MONITOR)
+        site_keys.prepare(keys, SITE, robots=["arm"], border="open", routers=[])
+        site_keys.issue(keys, "li", Role.OPERATOR)
+        site_keys.issue(keys, "mo", Role.MONITOR)
         endpoint = f"tls/127.0.0.1:{free_port()}"
         router = zenoh.open(router_config((endpoint,), (), keys.tls_of("router"), read_access(keys.access)))
         files = {"observer": keys.person("mo"), "foxglove": keys.person("mo"), "plain": keys.person("li")}

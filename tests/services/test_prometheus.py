@@ -14,9 +14,9 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from robomesh.contract.topics import Role
-from services.command_line.services.metrics_ports import ports, scrape_config
-from services.command_line.services.table import SERVICES
-from services.pki import Folder, authority
+from services.command_line.service_settings.metrics_ports import ports, scrape_config
+from services.command_line.service_settings.table import SERVICES
+from services.pki import Folder, site_keys
 from services.site_file import site as site_file
 from tests.conftest import free_port
 from tests.site import ONE_ARM, kill, robomesh, running_site, wait_until
@@ -130,7 +130,7 @@ def test_promtool_accepts_the_rules_their_tests_and_the_printed_configuration(tm
 def site(tmp_path_factory):
     """Return a site with keys, whose services serve metrics on free ports."""
     folder = tmp_path_factory.mktemp("site")
-    authority.prepare(Folder(folder / "keys"), "test", robots=["arm"], border="open", routers=[])
+    site_keys.prepare(Folder(folder / "keys"), "test", robots=["arm"], border="open", routers=[])
     more = '[keys]\nfolder = "keys"\n[metrics]\nlisten = "127.0.0.1:0"\n'
     with running_site(folder, robots=ONE_ARM, more=more) as running:
         wait_until(lambda: addresses(running).keys() == SERVICES.keys(), what="\n".join(running.log))
@@ -156,7 +156,7 @@ def test_dashboard_and_rules_ask_for_metrics_and_labels_that_the_services_have(s
         return {"robomesh_pictures_total", "robomesh_alarm"} <= labels.keys()
 
     # An alarm has a series only while it is active.
-    authority.issue(Folder(site.folder / "keys"), "li", Role.OPERATOR)
+    site_keys.issue(Folder(site.folder / "keys"), "li", Role.OPERATOR)
     person = str(site.folder / "keys" / "people" / "li.pem")
     freeze = ("fault", "arm", "freeze", "--connect", site.router.replace("tcp/", "tls/"), "--keys", person)
     wait_until(lambda: robomesh(*freeze).returncode == 0)  # the routers learn the name

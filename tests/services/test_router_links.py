@@ -11,7 +11,7 @@ import zenoh
 from robomesh.contract.endpoints import Link, bundle, client_config, router_config
 from robomesh.contract.keys import robot_key
 from robomesh.contract.topics import Role
-from services.pki import authority, certificates
+from services.pki import certificates, site_keys
 from services.router.rolling_restart import neighbours, wait_for_turn
 from services.router.router import read_access
 from tests.conftest import free_port
@@ -28,8 +28,8 @@ async def linked_sites(tmp_path, border="open", sites=()):
     """Yield folders and endpoints of two sites; the second links to the first as its guest."""
     here, at_here = prepared(tmp_path, "here", border)
     there, at_there = prepared(tmp_path, "there")
-    authority.issue_guest(here, "there")
-    assert authority.accept(there, here.guest("there").read_bytes(), sites=sites) == "here"
+    site_keys.issue_guest(here, "there")
+    assert site_keys.accept(there, here.guest("there").read_bytes(), sites=sites) == "here"
     link = Link(endpoint=at_here, tls=there.tls_of_link("here"), site="here")
     return (here, at_here), (there, at_there), link
 
@@ -44,7 +44,7 @@ async def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
         return CommandRequest(command=CommandRequest.HOME)
 
     (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
-    authority.issue(there, "li", Role.OPERATOR)
+    site_keys.issue(there, "li", Role.OPERATOR)
     async with (
         routing(settings_of(here, at_here), settings_of(there, at_there, link)),
         attached(at_here, here.service("gateway")) as ours,
@@ -68,7 +68,7 @@ async def test_two_sites_meet_and_each_speaks_for_itself_alone(tmp_path):
 
 async def test_a_gateway_of_another_site_neither_answers_nor_shows_itself_for_our_robot(tmp_path):
     (here, at_here), (there, at_there), link = await linked_sites(tmp_path)
-    authority.issue(here, "li", Role.OPERATOR)
+    site_keys.issue(here, "li", Role.OPERATOR)
     own, foreign = [], []
     keys = [f"robomesh/here/arm/{each}" for each in ("command/li.here", "lease/request/li.here", "stop")]
 
@@ -146,8 +146,8 @@ async def test_a_slow_border_lets_thinned_joints_and_the_far_view_out_and_nothin
 
 async def test_a_hub_brings_everybody_but_us(tmp_path):
     (here, at_here), (hub, at_hub), _ = await linked_sites(tmp_path)
-    authority.issue_guest(hub, "here")
-    authority.accept(here, hub.guest("here").read_bytes(), sites=("*",))
+    site_keys.issue_guest(hub, "here")
+    site_keys.accept(here, hub.guest("here").read_bytes(), sites=("*",))
     link = Link(endpoint=at_hub, tls=here.tls_of_link("there"), site="there")
     async with routing(settings_of(hub, at_hub), settings_of(here, at_here, link)):
         heard = set()
@@ -177,11 +177,11 @@ async def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_ow
     # The other site's authority can sign any name.
     other = certificates.read_authority(here.authority_key.read_bytes(), here.authority.read_bytes())
     made = certificates.issue(
-        other, name, "router", now=authority.now(), lifetime=timedelta(days=1), serves=True
+        other, name, "router", now=site_keys.now(), lifetime=timedelta(days=1), serves=True
     )
     forged = here.service("forged")
     forged.write_bytes(made.key + made.certificate + here.authority.read_bytes())
-    authority.issue(there, "router-2", Role.ROUTER)
+    site_keys.issue(there, "router-2", Role.ROUTER)
     second = f"tls/127.0.0.1:{free_port()}"
     own = bundle(there.service("router-2"))
     with (
@@ -208,7 +208,7 @@ async def test_a_neighbour_that_shows_one_of_our_own_names_is_cut_off_and_our_ow
 
 async def test_of_two_routers_of_a_site_the_second_waits_until_the_first_serves_again(tmp_path):
     folder, first = prepared(tmp_path)
-    authority.issue(folder, "router-2", Role.ROUTER)
+    site_keys.issue(folder, "router-2", Role.ROUTER)
     second = f"tls/127.0.0.1:{free_port()}"
     tls = {first: folder.tls_of("router"), second: bundle(folder.service("router-2"))}
     configs = {

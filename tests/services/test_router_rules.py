@@ -15,7 +15,7 @@ from robomesh.contract.topics import Role
 from robomesh.errors import NoAnswerError, NoRightError, SessionError
 from robomesh.wire.session import CERTIFICATE, SessionSettings, open_session
 from services import router as service
-from services.pki import Folder, authority, certificates, renewals
+from services.pki import Folder, certificates, renewals, site_keys
 from services.router.router import AccessError, read_access
 from tests.conftest import free_port, run
 
@@ -27,13 +27,13 @@ SITE = "here"
 def prepared(path, site=SITE, border="open"):
     folder = Folder(path / site / "keys")
     endpoint = f"tls/127.0.0.1:{free_port()}"
-    authority.prepare(folder, site, robots=["arm"], border=border, routers=[endpoint])
+    site_keys.prepare(folder, site, robots=["arm"], border=border, routers=[endpoint])
     return folder, endpoint
 
 
 def settings_of(folder, endpoint, *links):
     return service.Settings(
-        site=authority.principals_of(folder).site,
+        site=site_keys.principals_of(folder).site,
         listen=(endpoint,),
         connect=links,
         tls=folder.tls_of("router"),
@@ -79,7 +79,7 @@ async def names(session):
 
 async def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "li", Role.OPERATOR)
+    site_keys.issue(folder, "li", Role.OPERATOR)
 
     async def there(session, who):
         return who in await names(session)
@@ -91,13 +91,13 @@ async def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path
         await until(lambda: there(li, (SITE, "router")))
         async with attached(endpoint, folder.service("watch")) as watch:
             events = watch.subscribe("robomesh/*/-/events/*", newest=100)
-            authority.revoke(folder, "li")
+            site_keys.revoke(folder, "li")
             async for event in events:
                 if "router.without_rights" in str(event.message()):
                     assert "li.here is connected, but has no right here" in str(event.message())
                     break
         await until(lambda: is_empty(li))
-        authority.issue(folder, "mo", Role.MONITOR)
+        site_keys.issue(folder, "mo", Role.MONITOR)
         async with attached(endpoint, folder.person("mo")) as mo:
             await until(lambda: there(mo, (SITE, "router")))
             assert await is_empty(li)
@@ -105,7 +105,7 @@ async def test_a_running_router_follows_revoked_and_issued_certificates(tmp_path
 
 async def test_broken_rules_are_not_taken_and_the_router_goes_on(tmp_path, caplog):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "mo", Role.MONITOR)
+    site_keys.issue(folder, "mo", Role.MONITOR)
     good = folder.access.read_text()
 
     async def refused():
@@ -157,7 +157,7 @@ def test_an_invalid_rules_file_is_refused(tmp_path, text):
 
 def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_router(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "old", Role.MONITOR, lifetime=timedelta(seconds=-60))
+    site_keys.issue(folder, "old", Role.MONITOR, lifetime=timedelta(seconds=-60))
     # The file is not in the list, so this side does not know its date.
     text = folder.person("old").read_text()
     unsaid = tmp_path / "unsaid.pem"
@@ -177,7 +177,7 @@ def test_an_expired_certificate_is_refused_by_its_holder_in_words_and_by_the_rou
 
 def test_a_link_ends_with_its_certificate_and_comes_back_with_the_renewed_one(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(seconds=3))
+    site_keys.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(seconds=3))
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
@@ -199,7 +199,7 @@ def test_a_link_ends_with_its_certificate_and_comes_back_with_the_renewed_one(tm
 def test_another_authoritys_certificate_and_none_at_all_open_no_session(tmp_path):
     folder, endpoint = prepared(tmp_path)
     stranger, _ = prepared(tmp_path, "elsewhere")
-    authority.issue(stranger, "mo", Role.MONITOR)
+    site_keys.issue(stranger, "mo", Role.MONITOR)
     # It trusts the right router, but shows a certificate that the router does not know.
     forged = stranger.person("mo").read_text().rpartition("-----BEGIN")[0] + folder.authority.read_text()
     (tmp_path / "forged.pem").write_text(forged)
@@ -223,7 +223,7 @@ def test_another_authoritys_certificate_and_none_at_all_open_no_session(tmp_path
 
 def test_no_certificate_but_a_routers_passes_for_a_router(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "li", Role.OPERATOR)
+    site_keys.issue(folder, "li", Role.OPERATOR)
     imposter = router_config((endpoint,), (), bundle(folder.person("li")))
     with zenoh.open(imposter):
 
@@ -238,7 +238,7 @@ def test_no_certificate_but_a_routers_passes_for_a_router(tmp_path):
 def test_a_missing_right_is_reported_before_the_request_is_sent(tmp_path):
     folder, endpoint = prepared(tmp_path)
     for name, role in (("li", Role.OPERATOR), ("mo", Role.MONITOR)):
-        authority.issue(folder, name, role)
+        site_keys.issue(folder, name, role)
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
@@ -291,7 +291,7 @@ def test_zenohd_gets_the_routers_configuration(tmp_path):
 
 def test_a_certificate_shows_its_name_and_authority(tmp_path):
     folder, _ = prepared(tmp_path)
-    entry = authority.issue(folder, "li", Role.OPERATOR)
+    entry = site_keys.issue(folder, "li", Role.OPERATOR)
     shown = certificates.read_bundle(folder.person("li").read_bytes())
     assert (shown.name, shown.role, shown.authority) == ("li.here", "operator", "here")
     assert entry.expires == shown.expires
@@ -301,11 +301,11 @@ async def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_the
     tmp_path, caplog
 ):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "mo", Role.MONITOR)
+    site_keys.issue(folder, "mo", Role.MONITOR)
     bundle_of_router = folder.service("router")
     good = bundle_of_router.read_bytes()
-    other = authority.issued(
-        folder, authority.principals_of(folder), authority.principals_of(folder).find("router")
+    other = site_keys.issued(
+        folder, site_keys.principals_of(folder), site_keys.principals_of(folder).find("router")
     )
     assert other.find("router").serial
     other_key = bundle_of_router.read_bytes()
@@ -338,7 +338,7 @@ async def test_a_router_outlives_keys_that_are_gone_or_half_copied_and_takes_the
 async def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, caplog):
     caplog.set_level("INFO")
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "mo", Role.MONITOR)
+    site_keys.issue(folder, "mo", Role.MONITOR)
     rules = json.loads("\n".join(folder.access.read_text().splitlines()[1:]))
     rules["access_control"]["policies"][0]["rules"] = ["no such rule"]
 
@@ -357,14 +357,14 @@ async def test_rules_that_zenoh_refuses_are_not_said_to_be_followed(tmp_path, ca
 
 def test_a_renewed_certificate_is_reported_without_a_restart(tmp_path):
     folder, endpoint = prepared(tmp_path)
-    authority.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(hours=1))
+    site_keys.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(hours=1))
     with zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access))):
 
         async def main():
             async with attached(endpoint, folder.person("mo")) as mo:
                 (left,) = (each.read for each in mo.measures if each.name == CERTIFICATE)
                 assert 3500 < left() <= 3600
-                authority.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(hours=2))
+                site_keys.issue(folder, "mo", Role.MONITOR, lifetime=timedelta(hours=2))
                 assert 7100 < left() <= 7200
                 folder.person("mo").unlink()
                 assert 3500 < left() <= 3600

@@ -13,7 +13,7 @@ from robomesh.contract.endpoints import Tls, bundle, client_config, router_confi
 from robomesh.contract.keys import parse_presence_key
 from robomesh.contract.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
 from robomesh.errors import KeyNameError
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.router.router import read_access
 from tests.conftest import free_port
 from tests.site import wait_until
@@ -78,15 +78,15 @@ def one_link(endpoint: str, tls: Tls) -> zenoh.Config:
 def mesh(tmp_path_factory):
     """Yield a router, a client for each principal, and the witness, which answers every request."""
     folder = Folder(tmp_path_factory.mktemp("site") / "keys")
-    authority.prepare(folder, SITE, robots=[OWN_ROBOT], border="open", routers=[], started=[STARTED_ROBOT])
+    site_keys.prepare(folder, SITE, robots=[OWN_ROBOT], border="open", routers=[], started=[STARTED_ROBOT])
     for name, role in people().items():
         if role in PEOPLE:
-            authority.issue(folder, name, role)
-    authority.issue(folder, WITNESS, Role.ROUTER)
-    authority.issue(folder, "gone", Role.OPERATOR)
-    authority.revoke(folder, "gone")
-    authority.issue_guest(folder, OTHER_SITE)
-    authority.issue_guest(folder, HUB, sites=["*"])
+            site_keys.issue(folder, name, role)
+    site_keys.issue(folder, WITNESS, Role.ROUTER)
+    site_keys.issue(folder, "gone", Role.OPERATOR)
+    site_keys.revoke(folder, "gone")
+    site_keys.issue_guest(folder, OTHER_SITE)
+    site_keys.issue_guest(folder, HUB, sites=["*"])
     endpoint = f"tls/127.0.0.1:{free_port()}"
     opened = [zenoh.open(router_config((endpoint,), (), folder.tls_of("router"), read_access(folder.access)))]
 

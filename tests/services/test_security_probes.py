@@ -15,7 +15,7 @@ from robomesh.contract.endpoints import bundle, router_config
 from robomesh.contract.topics import Role
 from robomesh.wire.session import SessionSettings, open_session
 from services.command_line.doctor import security
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.router.router import read_access
 from tests.conftest import free_port, run
 
@@ -26,9 +26,9 @@ SITE, ARM = "hall", "robomesh/hall/arm"
 def folder(tmp_path):
     """Return the keys of a site with one robot, an operator and a monitor."""
     folder = Folder(tmp_path / "keys")
-    authority.prepare(folder, SITE, robots=["arm"], border="open", routers=[], started=["lab"])
-    authority.issue(folder, "li", Role.OPERATOR)
-    authority.issue(folder, "mo", Role.MONITOR)
+    site_keys.prepare(folder, SITE, robots=["arm"], border="open", routers=[], started=["lab"])
+    site_keys.issue(folder, "li", Role.OPERATOR)
+    site_keys.issue(folder, "mo", Role.MONITOR)
     return folder
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from controllers.simulated.demo import demo_tour
 from controllers.unit.simulated.controller import Controller
-from protocol_gateway.core.records import (
+from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Command,
     Error,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from controllers.simulated.demo import demo_tour
 from controllers.unit.simulated.controller import Controller
-from protocol_gateway.core.records import AbsolutePositions, Command
+from protocol_gateway.unit_protocol.records import AbsolutePositions, Command
 from robots.collision.cell import build_cell
 from robots.collision.distance import outside_clearance
 from robots.descriptions.description import load

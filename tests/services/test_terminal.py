@@ -20,7 +20,7 @@ import zenoh
 from robomesh.contract.endpoints import router_config
 from robomesh.service import service
 from services.command_line.commands import COMMANDS, load
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.table import SERVICES
 from tests import warm
 from tests.conftest import free_port
 from tests.hostile import IDENTITY, SEQUENCES, UNKNOWN, Values, publisher

@@ -12,7 +12,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh.wire.session import SessionSettings, open_session
 from services import router as service
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from tests.conftest import free_port, run
 from tests.site import robomesh, wait_until
 
@@ -71,7 +71,7 @@ def test_late_joiners_are_answered_and_nobody_reads_the_admin_space(tmp_path):
 
 def test_it_keeps_the_rules_that_our_router_keeps(tmp_path):
     folder, endpoint = Folder(tmp_path / "keys"), f"tls/127.0.0.1:{free_port()}"
-    authority.prepare(folder, SITE, robots=["arm"], border="open", routers=[endpoint])
+    site_keys.prepare(folder, SITE, robots=["arm"], border="open", routers=[endpoint])
     settings = service.Settings(
         site=SITE, listen=(endpoint,), tls=folder.tls_of("router"), access=folder.access
     )

@@ -28,8 +28,8 @@ from controllers.unit.simulated.execution import (
     asks_to_stop,
     orders_of,
 )
-from protocol_gateway.core.codes import code_table
-from protocol_gateway.core.records import (
+from protocol_gateway.unit_protocol.codes import code_table
+from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Error,
     Record,
@@ -37,7 +37,7 @@ from protocol_gateway.core.records import (
     Time,
     Velocities,
 )
-from protocol_gateway.core.scales import si_scales
+from protocol_gateway.unit_protocol.scales import si_scales
 from robots.kinematics.joints import FloatArray, Joints
 from robots.kinematics.motion import Motion
 from robots.kinematics.straight_motion import HOMING_REST_S, HOMING_SPEED

@@ -10,7 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from protocol_gateway.core.records import (
+from protocol_gateway.seam.errors import UnitError
+from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Command,
     Error,
@@ -19,8 +20,7 @@ from protocol_gateway.core.records import (
     Unknown,
     speed_percent,
 )
-from protocol_gateway.core.scales import si_scales
-from protocol_gateway.seam.errors import UnitError
+from protocol_gateway.unit_protocol.scales import si_scales
 from robots.kinematics.joints import FloatArray, Joints, violations
 
 MALFORMED, UNKNOWN_WORD, JOINT_COUNT, LIMIT, LOCAL, STOPPED, FAULT = 2, 3, 4, 5, 6, 8, 9

@@ -10,9 +10,15 @@ from controllers.simulated.faults import Faults, copies, pieces
 from controllers.unit.simulated import unit_faults
 from controllers.unit.simulated.controller import Controller
 from controllers.unit.simulated.execution import MALFORMED, asks_to_stop
-from protocol_gateway.core.records import AbsolutePositions, Command, Error, RelativePositions, write_unit
-from protocol_gateway.core.stream import Malformed, StreamEvent, Unit
 from protocol_gateway.serving.client import Client
+from protocol_gateway.unit_protocol.records import (
+    AbsolutePositions,
+    Command,
+    Error,
+    RelativePositions,
+    write_unit,
+)
+from protocol_gateway.unit_protocol.stream import Malformed, StreamEvent, Unit
 
 logger = logging.getLogger(__name__)
 

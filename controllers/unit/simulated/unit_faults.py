@@ -5,7 +5,14 @@ from collections.abc import Collection, Iterator, Sequence
 
 from controllers.simulated.fault_table import displacement
 from controllers.unit.simulated.execution import FAULT, LOCAL, asks_to_stop
-from protocol_gateway.core.records import AbsolutePositions, Command, Error, Record, Status, Velocities
+from protocol_gateway.unit_protocol.records import (
+    AbsolutePositions,
+    Command,
+    Error,
+    Record,
+    Status,
+    Velocities,
+)
 
 _TEXT = "drive of axis 1 overheated (simulated)"
 

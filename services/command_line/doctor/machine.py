@@ -21,8 +21,8 @@ from protocol_gateway.seam.simulated import Simulated
 from robomesh.errors import UnavailableError
 from robomesh.extras import ADDED_IN_CHECKOUT, install_command, is_missing
 from robomesh.listen_address import reachable, split_address
-from services.command_line.services.metrics_ports import first_address, ports
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.metrics_ports import first_address, ports
+from services.command_line.service_settings.table import SERVICES
 from services.command_line.terminal.output import print_json, print_line
 from services.used_ports import check_free, is_absent
 

@@ -32,7 +32,7 @@ from services.command_line.doctor.security_sessions import (
 )
 from services.command_line.doctor.security_table import ROBOTS, ROWS, names, should, tried, tried_on_real
 from services.command_line.terminal.output import print_json, print_line
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.pki.errors import KeysError
 
 _QUIET_S = 0.3
@@ -52,7 +52,7 @@ def run(keys: Folder, connect: tuple[str, ...], as_json: bool) -> int:
     Raises:
         KeysError: If there are no keys, or no router accepts them.
     """
-    principals = authority.principals_of(keys)
+    principals = site_keys.principals_of(keys)
     routers = connect or principals.routers
     if not routers:
         raise KeysError(f"{keys.principals} names no routers: give --connect tls/HOST:PORT")

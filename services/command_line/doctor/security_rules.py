@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.pki.principals import Principals
 from services.router.router import AccessError, read_access
 
@@ -14,7 +14,7 @@ def wrong_rules(keys: Folder, principals: Principals) -> list[str]:
         found = read_access(keys.access)
     except AccessError as error:
         return [str(error)]
-    wanted = json.loads("\n".join(_lines(authority.rules_of(principals))))
+    wanted = json.loads("\n".join(_lines(site_keys.rules_of(principals))))
     if found == wanted:
         return []
     problems = []

@@ -12,7 +12,7 @@ import zenoh
 from robomesh.contract.access_rights import PROBE_ROBOT, Act, Principal
 from robomesh.contract.endpoints import bundle, client_config, first_line
 from robomesh.contract.messages import PROTOBUF
-from services.pki import Folder, authority
+from services.pki import Folder, site_keys
 from services.pki.errors import KeysError
 from services.pki.principals import Principals
 
@@ -39,9 +39,9 @@ class Person:
 
 def with_files(keys: Folder, principals: Principals) -> Iterator[tuple[Principal, Path]]:
     """Yield the principals of the site whose certificate is in the folder and valid."""
-    now = authority.now()
+    now = site_keys.now()
     for entry in principals.entries:
-        file = Path(authority.file_of(keys, principals.site, entry))
+        file = Path(site_keys.file_of(keys, principals.site, entry))
         valid = entry.revoked is None and entry.expires is not None and entry.expires > now
         if valid and not entry.sites and file.is_file():
             yield entry.principal, file

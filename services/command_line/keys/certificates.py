@@ -43,7 +43,7 @@ def init(
 
     Run it again when the site file's robots, addresses or border change: existing keys stay.
     """
-    from services.pki import authority
+    from services.pki import site_keys
     from services.site_file import site as site_file
     from services.site_file.started_robots import may_start
     from services.site_file.tables.router import public
@@ -59,7 +59,7 @@ def init(
         print_line(f'{site}: [keys] folder = "keys" is added: its services connect by TLS from now on')
     assert read.keys.folder is not None
     folder = Folder(read.keys.folder)
-    made = authority.prepare(
+    made = site_keys.prepare(
         folder,
         read.site,
         robots=[robot.name for robot in read.robot],
@@ -90,11 +90,11 @@ def issue(
     as_json: Json = False,
 ) -> None:
     """Issue a certificate with its key, as one file to hand over."""
-    from services.pki import authority
+    from services.pki import site_keys
 
     where, lifetime = keys_folder(folder, quiet=as_json), timedelta(days=days)
     before, rules = (
-        authority.principals_of(where),
+        site_keys.principals_of(where),
         where.access.read_bytes() if where.access.is_file() else b"",
     )
     if guest:
@@ -102,14 +102,14 @@ def issue(
             not name and not role and not robots,
             "--guest takes no name, --role or --robots; for a hub add --sites",
         )
-        entry = authority.issue_guest(where, guest, sites=_listed(sites), lifetime=lifetime)
+        entry = site_keys.issue_guest(where, guest, sites=_listed(sites), lifetime=lifetime)
     else:
         _require(
             bool(name and role), "a name and --role are needed, as in: robomesh keys issue li --role operator"
         )
         _require(not sites, "--sites is for --guest")
-        entry = authority.issue(where, name, _role(role), robots=_listed(robots) or None, lifetime=lifetime)
-    file = authority.file_of(where, authority.principals_of(where).site, entry)
+        entry = site_keys.issue(where, name, _role(role), robots=_listed(robots) or None, lifetime=lifetime)
+    file = site_keys.file_of(where, site_keys.principals_of(where).site, entry)
     if as_json:
         _print(_record(entry) | {"file": file})
         return
@@ -119,7 +119,7 @@ def issue(
         earlier is not None
         and earlier.revoked is None
         and earlier.expires is not None
-        and earlier.expires > authority.now()
+        and earlier.expires > site_keys.now()
     ):
         print_line(
             f"{entry.name} had a certificate, until {_when(earlier.expires)}; now both are valid. "
@@ -143,12 +143,12 @@ def accept(
     folder: KeysFolder = None,
 ) -> None:
     """Accept a certificate that admits our routers at another site."""
-    from services.pki import authority
+    from services.pki import site_keys
     from services.pki.folder import read
 
     certificate = read(file)
     try:
-        site = authority.accept(keys_folder(folder), certificate, sites=_listed(sites))
+        site = site_keys.accept(keys_folder(folder), certificate, sites=_listed(sites))
     except KeysError as error:
         raise KeysError(f"{file}: {error}") from None
     print_line(f'site {site} admits us: connect = ["{site}"] under [router] in the site file links to it')
@@ -203,9 +203,9 @@ def revoke(name: str, folder: KeysFolder = None) -> None:
 
     The name cannot be issued again while a certificate for it is valid.
     """
-    from services.pki import authority
+    from services.pki import site_keys
 
-    entry = authority.revoke(keys_folder(folder), name)
+    entry = site_keys.revoke(keys_folder(folder), name)
     print_line(
         f"{entry.name} has no rights any more: the site's router disconnects it now; each of two routers does"
     )
@@ -215,16 +215,16 @@ def revoke(name: str, folder: KeysFolder = None) -> None:
 @app.command("list")
 def list_(folder: KeysFolder = None, as_json: Json = False) -> None:
     """List certificates: name, role, expiry."""
-    from services.pki import authority
+    from services.pki import site_keys
     from services.pki.renewals import RENEW_WITHIN
 
-    principals = authority.principals_of(keys_folder(folder, quiet=as_json))
+    principals = site_keys.principals_of(keys_folder(folder, quiet=as_json))
     for entry in principals.entries:
         if as_json:
             _print(_record(entry))
             continue
         until = "by its own site" if entry.expires is None else f"until {_when(entry.expires)}"
-        now = authority.now()
+        now = site_keys.now()
         if entry.revoked is not None:
             until = f"revoked {_when(entry.revoked)}"
         elif entry.expires is not None and entry.expires <= now:

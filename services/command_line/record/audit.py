@@ -192,7 +192,7 @@ def _checked_most(most: int) -> int:
 
 def _of_file(file: Path, query: schema.AuditQuery) -> list[_Row]:
     from protocol_gateway.audit import search
-    from protocol_gateway.authority.entry import audit_entry
+    from protocol_gateway.authority.audit_entry import audit_entry
 
     try:
         found = search.find(file, search.query_of(query))

@@ -45,7 +45,7 @@ def metrics(
     ] = "",
 ) -> None:
     """Print a Prometheus configuration that scrapes every service of a site."""
-    from services.command_line.services.metrics_ports import print_scrape_config
+    from services.command_line.service_settings.metrics_ports import print_scrape_config
 
     print_scrape_config(site, listen)
 
@@ -134,7 +134,7 @@ def store(site: SiteFile = None, connect: Connect = DEFAULT_ROUTER, metrics: Met
 
 
 def _run(name: str, site: Path | None, connect: str, metrics: str, **options: Any) -> None:
-    from services.command_line.services.table import Options
+    from services.command_line.service_settings.table import Options
     from services.command_line.site.launch import launch
 
     launch(name, Options(site_file=site, **options), connect, metrics)

@@ -8,9 +8,9 @@ from robomesh.contract.keys import WHOLE_SITE
 from robomesh.listen_address import own_addresses
 from robomesh.service import service
 from robomesh.wire.session import SessionSettings
-from services.command_line.services.controllers import ControllerError
-from services.command_line.services.metrics_ports import own_address
-from services.command_line.services.table import SERVICES, Options
+from services.command_line.service_settings.controllers import ControllerError
+from services.command_line.service_settings.metrics_ports import own_address
+from services.command_line.service_settings.table import SERVICES, Options
 from services.command_line.terminal.connection_options import with_keys
 from services.site_file import site as site_file
 from services.site_file.site import Site

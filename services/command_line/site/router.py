@@ -4,7 +4,7 @@ from pathlib import Path
 
 from robomesh.service import service
 from services import router
-from services.command_line.services.metrics_ports import own_address
+from services.command_line.service_settings.metrics_ports import own_address
 from services.command_line.terminal.output import print_line
 from services.pki import Folder
 from services.site_file.tables.router import RoutedSite, read_routed

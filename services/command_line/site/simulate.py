@@ -17,7 +17,7 @@ from protocol_gateway.seam.simulated import Common, Option, Simulated
 from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.contract.keys import check_name
 from robomesh.service import service
-from services.command_line.services.controllers import ControllerError
+from services.command_line.service_settings.controllers import ControllerError
 from services.command_line.site.launch import session_settings
 from services.command_line.terminal.connection_options import offer_keys
 from services.command_line.terminal.options import Connect, SiteFile, command_group

@@ -20,8 +20,12 @@ from robomesh.listen_address import own_addresses, split_address
 from robomesh.service import service
 from robomesh.wire.session import SessionSettings, open_session
 from services.command_line import main
-from services.command_line.services.metrics_ports import extra_with_metrics, first_address, with_metrics
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.metrics_ports import (
+    extra_with_metrics,
+    first_address,
+    with_metrics,
+)
+from services.command_line.service_settings.table import SERVICES
 from services.command_line.terminal.output import print_line
 from services.errors import SiteFileError
 from services.pki import Folder
@@ -186,15 +190,15 @@ class _Started:
         """
         if names == self._entitled or self._site.keys.folder is None:
             return
-        from services.pki import authority  # imports cryptography
+        from services.pki import site_keys  # imports cryptography
 
         folder = Folder(self._site.keys.folder)
         # A folder with bundles only belongs to a machine without the page.
         if names or folder.principals.is_file():
-            there, ahead = authority.entitled(folder), {*names, *may_start(self._site)}
+            there, ahead = site_keys.entitled(folder), {*names, *may_start(self._site)}
             try:
                 if not there.issuperset(names if self._entitled is not None else ahead):
-                    authority.entitle(folder, [*ahead])
+                    site_keys.entitle(folder, [*ahead])
             except KeysError as error:
                 if not there.issuperset(names):
                     raise

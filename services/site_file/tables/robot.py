@@ -19,11 +19,11 @@ from pydantic import (
 
 from protocol_gateway.configuration.controller_proofs import StopProof
 from protocol_gateway.configuration.kinds import is_known, kind_of, own_kinds, protocols
-from protocol_gateway.core.codes import code_table
 from protocol_gateway.seam import Recovery
 from protocol_gateway.seam.errors import CodeTableError, GatewaySettingsError
 from protocol_gateway.seam.kind import Kind
 from protocol_gateway.seam.table import PART_CONFIG, Declared, Table, problem_text
+from protocol_gateway.unit_protocol.codes import code_table
 from robomesh.contract import keys
 from robomesh.contract.access_rights import PROBE_ROBOT
 from robomesh.errors import KeyNameError, ListenError

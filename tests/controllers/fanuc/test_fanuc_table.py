@@ -5,7 +5,7 @@ import pytest
 from controllers.fanuc.axes import with_defaults
 from controllers.fanuc.table import Fanuc
 from robots.kinematics.joints import JointType
-from services.command_line.services.table import SERVICES, Options
+from services.command_line.service_settings.table import SERVICES, Options
 from services.command_line.site.up import programs
 from services.site_file.site import Site, load
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from services.command_line.services.controllers import controller_addresses
+from services.command_line.service_settings.controllers import controller_addresses
 from services.site_file.site import Site, resolve_site
 
 OPC_UA = {"name": "handler", "model": "puma560", "protocol": "opcua", "controller": "tcp://10.0.0.7:4840"}

@@ -12,8 +12,8 @@ import pytest
 from controllers.simulated.errors import SimulatorError
 from controllers.simulated.faults import Span, parse_fault
 from controllers.unit.simulated.service import Settings, serve
-from protocol_gateway.core.records import Error
-from protocol_gateway.core.stream import Malformed, Unit, UnitStream
+from protocol_gateway.unit_protocol.records import Error
+from protocol_gateway.unit_protocol.stream import Malformed, Unit, UnitStream
 from robomesh.errors import ListenError
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of

@@ -9,7 +9,7 @@ from controllers.universal_robots import motion_driver
 from controllers.universal_robots.interfaces.modes import RobotMode, RuntimeState, SafetyMode
 from controllers.universal_robots.simulated import controller as simulated
 from protocol_gateway.audit.log import read_entries
-from protocol_gateway.authority.entry import Outcome
+from protocol_gateway.authority.audit_entry import Outcome
 from protocol_gateway.seam import Recovery
 from protocol_gateway.seam.errors import GatewaySettingsError
 from robomesh.errors import RefusedError

@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.command_line.services.controllers import ControllerError, controller_addresses
+from services.command_line.service_settings.controllers import ControllerError, controller_addresses
 from services.command_line.site.up import programs
 from services.site_file.site import Site
 

@@ -4,8 +4,8 @@ import pytest
 
 from controllers.yaskawa.axes import with_factors
 from controllers.yaskawa.table import Yaskawa
-from services.command_line.services.controllers import controller_addresses
-from services.command_line.services.table import SERVICES, Options
+from services.command_line.service_settings.controllers import controller_addresses
+from services.command_line.service_settings.table import SERVICES, Options
 from services.command_line.site.up import programs
 from services.site_file.site import Site
 

@@ -25,9 +25,9 @@ from protocol_gateway.authority.events import JogEnded, JogEnding, JogHeld, JogP
 from protocol_gateway.authority.lease_rules import not_sent, why_not_holder
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.checking.worker_messages import Extended, Positions
-from protocol_gateway.control.abort import abort_reason
-from protocol_gateway.control.control import Control, command_answer, refusal
-from protocol_gateway.control.motion_checks import MotionChecks
+from protocol_gateway.execution.abort import abort_reason
+from protocol_gateway.execution.control import Control, command_answer, refusal
+from protocol_gateway.execution.motion_checks import MotionChecks
 from protocol_gateway.seam import Activity
 from protocol_gateway.seam.errors import CheckError
 from protocol_gateway.telemetry.journal import Journal

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from robomesh.errors import ListenError
 from robomesh.listen_address import check_reach, split_address
-from services.command_line.services.table import SERVICES
+from services.command_line.service_settings.table import SERVICES
 from services.command_line.terminal.output import print_text
 from services.site_file.tables.router import RoutedSite
 from services.supervisor import ExtraPrograms, SupervisedProgram

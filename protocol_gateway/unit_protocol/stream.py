@@ -10,12 +10,12 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from protocol_gateway.core import codes
-from protocol_gateway.core.codes import CodeTable
-from protocol_gateway.core.grammar import TERMINATOR
-from protocol_gateway.core.plain import plain_readers, read_plain
-from protocol_gateway.core.records import Record, read_records
 from protocol_gateway.seam.errors import UnitError
+from protocol_gateway.unit_protocol import codes
+from protocol_gateway.unit_protocol.codes import CodeTable
+from protocol_gateway.unit_protocol.grammar import TERMINATOR
+from protocol_gateway.unit_protocol.plain import plain_readers, read_plain
+from protocol_gateway.unit_protocol.records import Record, read_records
 
 LONGEST_UNIT_BYTES = 64 * 1024
 """Most bytes of a unit, including its "@"."""

@@ -7,13 +7,13 @@ from functools import partial
 
 from google.protobuf.message import Message
 
+from protocol_gateway.authority.audit_entry import Entry, Outcome
 from protocol_gateway.authority.entries import MESH, entry_of
-from protocol_gateway.authority.entry import Entry, Outcome
-from protocol_gateway.control.clocks import read_clocks
-from protocol_gateway.control.control import Control
-from protocol_gateway.control.deadlines import set_deadline
-from protocol_gateway.control.jog_runner import JogRunner
-from protocol_gateway.control.program_runner import ProgramRunner
+from protocol_gateway.execution.clocks import read_clocks
+from protocol_gateway.execution.control import Control
+from protocol_gateway.execution.deadlines import set_deadline
+from protocol_gateway.execution.jog_runner import JogRunner
+from protocol_gateway.execution.program_runner import ProgramRunner
 from protocol_gateway.seam.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
 from robomesh import reason_codes as codes
 from robomesh.contract.topics import check_operator

@@ -22,10 +22,10 @@ from protocol_gateway.authority.events import ProgramEnded
 from protocol_gateway.authority.lease_rules import Answer, refused
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.checking.worker_messages import Checked
-from protocol_gateway.control.abort import abort_reason
-from protocol_gateway.control.clocks import read_clocks
-from protocol_gateway.control.control import Control, command_answer, refusal
-from protocol_gateway.control.motion_checks import MotionChecks
+from protocol_gateway.execution.abort import abort_reason
+from protocol_gateway.execution.clocks import read_clocks
+from protocol_gateway.execution.control import Control, command_answer, refusal
+from protocol_gateway.execution.motion_checks import MotionChecks
 from protocol_gateway.seam import Activity
 from protocol_gateway.seam.errors import CheckError
 from protocol_gateway.seam.text_limits import LONGEST_TEXT

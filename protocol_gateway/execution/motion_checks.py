@@ -31,7 +31,7 @@ from protocol_gateway.checking.worker_messages import (
     ExtendJog,
     Positions,
 )
-from protocol_gateway.control.clocks import read_clocks
+from protocol_gateway.execution.clocks import read_clocks
 from protocol_gateway.link.motion import has_arrived
 from protocol_gateway.seam import Activity
 from protocol_gateway.seam.errors import CheckError

@@ -59,7 +59,7 @@ def _gateway(site: "Site", options: Options) -> Any:
     from protocol_gateway.configuration.settings import RobotSettings
     from protocol_gateway.gateway import Settings
     from services.cells.descriptions import cells_of
-    from services.command_line.services.controllers import controller_addresses, legacy_settings
+    from services.command_line.service_settings.controllers import controller_addresses, legacy_settings
 
     addresses, cells = controller_addresses(site, options.controllers), cells_of(site)
     robots = tuple(

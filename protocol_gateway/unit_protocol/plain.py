@@ -7,10 +7,10 @@ unusual, is left to the grammar. It is several times as fast, because it parses 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from protocol_gateway.core import codes
-from protocol_gateway.core.codes import CodeTable, Meaning
-from protocol_gateway.core.grammar import BLANKS
-from protocol_gateway.core.records import (
+from protocol_gateway.unit_protocol import codes
+from protocol_gateway.unit_protocol.codes import CodeTable, Meaning
+from protocol_gateway.unit_protocol.grammar import BLANKS
+from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Record,
     RelativePositions,

@@ -23,10 +23,10 @@ from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.lease_rules import Answer, Authority
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
-from protocol_gateway.control.audit_trail import AuditTrail
-from protocol_gateway.control.clocks import read_clocks
-from protocol_gateway.control.deadlines import CommandArrivals
-from protocol_gateway.control.motion_checks import MotionChecks
+from protocol_gateway.execution.audit_trail import AuditTrail
+from protocol_gateway.execution.clocks import read_clocks
+from protocol_gateway.execution.deadlines import CommandArrivals
+from protocol_gateway.execution.motion_checks import MotionChecks
 from protocol_gateway.seam.errors import AuditError, LinkError
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.state_messages import lease_answer

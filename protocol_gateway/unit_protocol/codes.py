@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
 
-from protocol_gateway.core.grammar import plain_text
 from protocol_gateway.seam.errors import CodeTableError
+from protocol_gateway.unit_protocol.grammar import plain_text
 
 COMMAND = "COMMAND"
 ABSOLUTE = "ABSOLUTE.DEG"

@@ -19,10 +19,10 @@ from decimal import Decimal
 from types import MappingProxyType
 from typing import TypeAlias
 
-from protocol_gateway.core import codes
-from protocol_gateway.core.codes import CodeTable, Meaning
-from protocol_gateway.core.grammar import RawRecord, format_unit, parse_unit, plain_text, type_code
 from protocol_gateway.seam.errors import UnitError, UnitFormatError
+from protocol_gateway.unit_protocol import codes
+from protocol_gateway.unit_protocol.codes import CodeTable, Meaning
+from protocol_gateway.unit_protocol.grammar import RawRecord, format_unit, parse_unit, plain_text, type_code
 
 # Some controllers send "- 67.10", with a blank after the sign (Chen et al. 2001, section 4).
 # The pattern is unambiguous, so that it rejects a long invalid text in linear time.
