@@ -235,9 +235,9 @@ def beside_video(made: Stage, mbit: float, seconds: float, video: str = VIDEO) -
 
 def fetch_shapes(made: Stage, times: int) -> dict[str, Any]:
     """Return how many meshes arrived complete, the time for each, and the joints during the transfer."""
-    sha256 = made.beside.do("hold_mesh", "plant", "arm", SHAPE_BYTES)
+    sha256 = made.beside.do("hold_shape", "plant", "arm", SHAPE_BYTES)
     made.room.do("samples", JOINTS)
-    answers = [made.room.do("mesh", MESH, 10.0) for _ in range(times)]
+    answers = [made.room.do("shape", MESH, 10.0) for _ in range(times)]
     lags = [lag for _, lag, live, *_ in made.room.do("samples", JOINTS) if live]
     return {
         "whole": f"{sum(each.get('sha256') == sha256 for each in answers)} of {times}",

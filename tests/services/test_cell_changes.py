@@ -247,7 +247,6 @@ save = CellFile.save
 CellFile.save = lambda *given: (save(*given), os.kill(os.getpid(), signal.SIGKILL))
 """
 BEFORE_SHOWN = """
-from services.kinematics.shown_cell import Shown, ShownCell
 from services.kinematics.answers import Workers
 async def die(*_):
     os.kill(os.getpid(), signal.SIGKILL)

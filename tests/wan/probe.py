@@ -122,7 +122,7 @@ class Probe:
         self._session.answer(site, robot, "mesh/*", answer)
         return hashlib.sha256(mesh).hexdigest()
 
-    async def mesh(self, key: str, timeout_s: float) -> dict[str, Any]:
+    async def shape(self, key: str, timeout_s: float) -> dict[str, Any]:
         """Return a mesh's SHA-256 or the error, and the duration."""
         began = time.monotonic()
         try:

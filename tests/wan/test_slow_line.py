@@ -23,12 +23,12 @@ def test_a_shape_arrives_whole_beside_more_video_than_the_line_carries(tmp_path)
         for site in (hub, plant):
             site.start("router")
         beside, away = Probe(plant.host), Probe(hub.host)
-        sha256 = beside.do("hold_mesh", "plant", "arm", SHAPE_BYTES)
+        sha256 = beside.do("hold_shape", "plant", "arm", SHAPE_BYTES)
         beside.do("pour", "plant", "arm", "free", 8.0, 30.0)
         away.do("watch", VIDEO)
         away.wait_for("samples", VIDEO)
         line.change(delay_ms=40.0, rate_bps=2e6)
         away.do("samples", VIDEO)
-        answer = away.do("mesh", MESH, 60.0)
+        answer = away.do("shape", MESH, 60.0)
         assert answer.get("sha256") == sha256, answer
         assert away.wait_for("samples", VIDEO), "the video goes on"
