@@ -39,6 +39,9 @@ const take = async () => {
 };
 const hold = async () => { const { taken, id } = await take(); grant(id); await taken; };
 const next = async () => page.LeaseRequest_Action[(await request()).action];
+const watching = [];
+document.addEventListener = (name, act) => name === "visibilitychange" && watching.push(act);
+const hide = (hidden) => { document.hidden = hidden; for (const act of watching) act(); };
 
 page.followThisTab();
 page.keepConnected(async () => true, () => {});
@@ -94,12 +97,27 @@ def test_a_release_before_the_answer_gives_the_lease_back(steps):
     assert steps(script) == ["RELEASE", None, "Control released."]
 
 
+def test_a_page_that_is_hidden_gives_its_lease_back_with_the_cause(steps):
+    script = """
+    const cause = async () => page.LeaseRequest_Cause[(await request()).cause];
+    const { taken, id } = await take();
+    hide(true);
+    hide(false);
+    grant(id);
+    const early = await cause();
+    await hold();
+    hide(true);
+    answer([early, await cause(), ...state()]);
+    """
+    assert steps(script) == ["HIDDEN", "HIDDEN", None, "Control released because this page was hidden."]
+
+
 def test_only_one_request_is_on_its_way(steps):
     script = "const { id } = await take(); await page.take(ROBOT); answer(sent.length);"
     assert steps(script) == 0
 
 
-def test_the_message_of_a_lost_lease_stays_until_a_third_operator_has_control(steps):
+def test_the_message_of_a_lost_lease_stays_until_control_changes_again(steps):
     script = """
     await hold();
     published("wang", 10, { ended: "taken over by wang" });

@@ -1,8 +1,8 @@
-import "./styles"; // first: what a component imports besides overrides it
+import "./styles"; // First, because the sheets that components import themselves must override these.
 import "@preact/signals";
 import { render } from "preact";
 import { isolateTexts } from "../i18n/text-isolation";
-import { showLanguage } from "../i18n/texts";
+import { showFirstLanguage } from "../i18n/texts";
 import { fetchAccount, reportActivity, signedOut } from "../mesh/console/account";
 import { keepConnected } from "../mesh/console/connection";
 import { followThisTab } from "../mesh/control/control";
@@ -12,16 +12,14 @@ import { App } from "./app";
 
 isolateTexts();
 applyTheme();
-void showLanguage().then(start);
-
-function start(): void {
-  followThisTab();
-  renewWhileBusy();
-  const maySee = async () => {
-    const who = await fetchAccount();
-    return who && (!who.accounts || who.account !== "");
-  };
-  reportActivity(keepConnected(maySee, signedOut));
+followThisTab();
+renewWhileBusy();
+const maySee = async () => {
+  const who = await fetchAccount();
+  return who && (!who.accounts || who.account !== "");
+};
+reportActivity(keepConnected(maySee, signedOut));
+void showFirstLanguage().then(() => {
   const root = document.getElementById("app");
   if (root) render(<App />, root);
-}
+});

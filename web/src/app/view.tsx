@@ -4,7 +4,7 @@ import "@preact/signals";
 import { render } from "preact";
 import { ViewPage } from "../features/view/view-page";
 import { isolateTexts } from "../i18n/text-isolation";
-import { isLanguage, showLanguage } from "../i18n/texts";
+import { isLanguage, showFirstLanguage } from "../i18n/texts";
 import { followView } from "../mesh/console/view-stream";
 import { applyTheme, theme } from "../ui/theme";
 import "../ui/tokens.css";
@@ -21,8 +21,8 @@ if (wantedTheme === "dark" || wantedTheme === "light") theme.value = wantedTheme
 isolateTexts();
 applyTheme();
 const token = query.get("token");
-void showLanguage(isLanguage(wantedLanguage) ? wantedLanguage : undefined).then(() => {
-  followView(`${location.pathname}/live${token ? `?${new URLSearchParams({ token })}` : ""}`);
+followView(`${location.pathname}/live${token ? `?${new URLSearchParams({ token })}` : ""}`);
+void showFirstLanguage(isLanguage(wantedLanguage) ? wantedLanguage : undefined).then(() => {
   const root = document.getElementById("view");
   if (root) render(<ViewPage site={site} robot={robot} view={view} />, root);
 });

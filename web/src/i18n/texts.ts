@@ -25,6 +25,7 @@ export type NameIn<Section extends string> = (TextName | WithoutSection<Key, Sec
 export type Values = Readonly<Record<string, string | number>>;
 
 const STORAGE_KEY = "robomesh.language";
+const FIRST_WAIT_MS = 2000;
 
 const shownLanguage = signal<{ name: Language; catalogue: Catalogue }>({ name: "en", catalogue: en });
 let wanted: Language = "en"; // while its catalogue is loaded
@@ -41,20 +42,26 @@ function preferredLanguage(): Language {
 
 /** Show the page in a language, by default the preferred one. The language stays if its catalogue cannot be loaded,
  * for example because a newer console has another one. */
-export async function showLanguage(name = preferredLanguage()): Promise<void> {
+async function showLanguage(name = preferredLanguage()): Promise<void> {
   wanted = name;
   try {
     const catalogue = await CATALOGUES[name].load();
     if (wanted === name) shownLanguage.value = { name, catalogue };
   } catch (error) {
     console.error(error);
+    wanted = language.peek();
   }
   document.documentElement.lang = t("language_tag");
 }
 
+/** Show the first language, after `FIRST_WAIT_MS` at the latest in English: the page has a stop, which must not wait
+ * for texts. */
+export const showFirstLanguage = (name?: Language): Promise<void> =>
+  Promise.race([showLanguage(name), new Promise<void>((resolve) => setTimeout(resolve, FIRST_WAIT_MS))]);
+
 /** Show the page in a language from now on; by default in the next one. */
 export function switchLanguage(to?: Language): void {
-  const next = to ?? LANGUAGES[(LANGUAGES.indexOf(language.value) + 1) % LANGUAGES.length] ?? "en";
+  const next = to ?? LANGUAGES[(LANGUAGES.indexOf(wanted) + 1) % LANGUAGES.length] ?? "en";
   localStorage.setItem(STORAGE_KEY, next);
   void showLanguage(next);
 }

@@ -45,6 +45,7 @@ export function NoteForm(props: {
     >
       <TextInput
         ref={input}
+        spellcheck
         maxLength={LONGEST_TEXT}
         aria-label={n("text")}
         placeholder={n("note_hint")}

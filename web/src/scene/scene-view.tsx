@@ -6,6 +6,7 @@ import type { Description, View } from "../gen/robomesh_pb";
 import { KinematicStateSchema, ReplayStateSchema, View_Projection, ViewSchema } from "../gen/robomesh_pb";
 import { staleText, whenText } from "../i18n/format";
 import { recordingsText as r, t, viewText } from "../i18n/texts";
+import { reasonOf } from "../mesh/console/connection";
 import { OWN_DRAWING, useShownView } from "../mesh/control/display-freshness";
 import type { MomentState } from "../mesh/services/replay-moment";
 import { distanceText, useClearanceLevel } from "../mesh/state/clearance";
@@ -36,7 +37,7 @@ function useDrawing(wanted: boolean, failed: (why: string) => void): typeof draw
     if (!wanted || loaded) return;
     import("./robot-scene").then(
       (all) => setLoaded((drawing = all)),
-      (error: unknown) => failed(error instanceof Error ? error.message : String(error)),
+      (error: unknown) => failed(reasonOf(error)),
     );
   }, [wanted, loaded]);
   return loaded;

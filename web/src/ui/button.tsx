@@ -1,11 +1,11 @@
 // A button with a text.
 
-import type { ButtonHTMLAttributes, ComponentChildren } from "preact";
+import type { ButtonHTMLAttributes } from "preact";
 
-/** A button of an action; or a quiet one, without a border. Outside of a form it submits nothing. */
+/** A button of an action; or a quiet one, without a border. In a form, name its `type`: by default it submits. */
 export function Button(
   props: ButtonHTMLAttributes<HTMLButtonElement> & {
-    text: ComponentChildren;
+    text: string;
     quiet?: boolean;
     primary?: boolean;
     destructive?: boolean;

@@ -6,11 +6,11 @@ import type { Notice } from "../mesh/control/control";
 
 /** Return the outcome of the newest action, and a function that performs one.
  *
- * @param refusal Return why it was refused, with the reason in words. */
+ * @param refusal Makes the message of a refusal from its reason. */
 export function useOutcome(refusal: (text: string) => string) {
   const [notice, setNotice] = useState<Notice | null>(null);
   const [isBusy, setBusy] = useState(false);
-  /** @param busy What is being done in words; "": no message is needed.
+  /** @param busy Message while the work runs, such as "Saving…"; "": none.
    * @param work Returns what was done in words; nothing: no message is needed.
    * @returns Whether it succeeded. */
   const perform = async (busy: string, work: () => Promise<string | undefined>): Promise<boolean> => {

@@ -45,7 +45,7 @@ export function ReasonForm(props: {
       {props.children}
       <label>
         <span class="dim">{t(props.required ? "reason_required" : "reason_optional")}</span>
-        <TextInput ref={input} maxLength={120} value={reason} set={setReason} />
+        <TextInput ref={input} spellcheck maxLength={120} value={reason} set={setReason} />
       </label>
       <div class="reason-row flex to-end gap-8">
         <Button text={t("cancel")} type="button" onClick={props.close} />

@@ -14,7 +14,7 @@ export function Select<Value extends string>(props: {
   const { label, value, values, text, choose, ...attributes } = props;
   return (
     <select
-      {...(label && { "aria-label": label })}
+      aria-label={label}
       {...attributes}
       value={value}
       onChange={(event) => choose(event.currentTarget.value as Value)}

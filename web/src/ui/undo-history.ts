@@ -17,7 +17,7 @@ export function undoHistory<State>(most: number) {
     canUndo: computed(() => past.value.length > 0),
     canRedo: computed(() => future.value.length > 0),
     clear: () => void (past.value = future.value = []),
-    /** Keep the state before a change; `isPart`: the change belongs to the step before. */
+    /** Keep the state before a change; `isPart`: undo takes this change back with the one before. */
     keep: (before: State, isPart: boolean) => {
       if (!isPart) past.value = [...past.value, before].slice(-most);
       future.value = [];

@@ -4,7 +4,7 @@ import { fromBinary } from "@bufbuild/protobuf";
 import { CompressedVideoSchema } from "../gen/foxglove/CompressedVideo_pb";
 import { VideoFramesSchema } from "../gen/robomesh_pb";
 import type { Sample } from "../mesh/console/connection";
-import { watch } from "../mesh/console/connection";
+import { reasonOf, watch } from "../mesh/console/connection";
 import type { Picture } from "../mesh/control/display-freshness";
 import { codecName, isKeyFrame } from "./h264";
 
@@ -80,7 +80,7 @@ export function playVideo(key: string, canvas: HTMLCanvasElement, listener: Vide
       }
     } catch (error) {
       codec = "";
-      listener.failed(error instanceof Error ? error.message : String(error));
+      listener.failed(reasonOf(error));
     }
   };
   const stop = watch(key, take);

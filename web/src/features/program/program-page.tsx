@@ -84,7 +84,7 @@ function ProgramOfRobot({ site, robot, sha256 }: RobotName & { sha256: string })
   const running = useTopic(ProgramStateSchema, `${key}/program`);
   const programs = useTopic(ProgramListSchema, `${key}/programs`);
   const events = useEvents(key);
-  const [outcome, setOutcome] = useOutcome();
+  const [outcome, setOutcome] = useFadingWords();
   const [stage, setStage] = useState<Stage | null>(null);
   useEffect(() => (stage ? addTeachGizmo(stage) : undefined), [stage]);
   const age = jointsAge(joints, controller);
@@ -208,7 +208,7 @@ function hasMoved(positions: readonly (number | undefined)[]): boolean {
   return start !== undefined && positions.some((each, i) => Math.abs((each ?? NaN) - (start[i] ?? NaN)) > MOVED);
 }
 
-function useOutcome(): [Words, (words: Words) => void] {
+function useFadingWords(): [Words, (words: Words) => void] {
   const [shown, setShown] = useState<{ words: Words }>({ words: noWords });
   useEffect(() => {
     const timer = setTimeout(() => setShown({ words: noWords }), SHOWN_MS);

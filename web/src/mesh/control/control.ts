@@ -64,8 +64,8 @@ export const controlNotice = signal<Notice | null>(null);
 
 type State =
   | { phase: "none" }
-  /** `unwanted`: released before the answer came. */
-  | { phase: "asking"; unwanted: boolean }
+  /** `unwanted`: why control was released before the answer came. */
+  | { phase: "asking"; unwanted: { text: string; cause: Cause | undefined } | null }
   | { phase: "held"; lease: HeldLease; offeredTo: string }
   /** `explained`: the message gives the reason; `successor`: the lease that replaced this one. */
   | { phase: "lost"; lease: HeldLease; offeredTo: string; explained: boolean; successor: string };
@@ -77,15 +77,15 @@ type State =
  *     none     has no lease                                         ask
  *     asking   waits for the answer to its request                  grant; end: it was refused
  *     held     has a lease, and renews it                           renew, lose; ask; end: it was released
- *     lost     shows why its lease ended without a release, until   ask; end: another operator
- *              another operator takes control                       took control
+ *     lost     shows why its lease ended without a release, until   ask; end: control changed
+ *              control changes again                                again
  */
 class Control {
   readonly state = signal<State>({ phase: "none" });
   private renewal: ReturnType<typeof setTimeout> | undefined;
 
   ask(): void {
-    this.become({ phase: "asking", unwanted: false });
+    this.become({ phase: "asking", unwanted: null });
   }
 
   grant(lease: HeldLease): void {
@@ -174,11 +174,11 @@ async function begin(robotKey: string, action: Action, reason = ""): Promise<voi
   if (before) await giveBack(before);
   controlNotice.value = { kind: "busy", text: t("taking") };
   const requestedAt = performance.now();
-  let unwanted = false;
+  let unwanted: { text: string; cause: Cause | undefined } | null = null;
   try {
     const answer = await askLease(robotKey, who, action, { reason });
     const state = control.state.peek();
-    unwanted = state.phase === "asking" && state.unwanted;
+    if (state.phase === "asking") unwanted = state.unwanted;
     control.grant(leaseFrom(robotKey, who, answer, requestedAt));
     controlNotice.value = null;
   } catch (error) {
@@ -186,7 +186,7 @@ async function begin(robotKey: string, action: Action, reason = ""): Promise<voi
     controlNotice.value = { kind: "refused", text: t("not_taken", { text: reasonOf(error) }) };
   }
   if (document.hidden) await releaseHidden();
-  else if (unwanted) await release();
+  else if (unwanted) await release(unwanted.text, unwanted.cause);
 }
 
 /** Ask the operator in control for it; every page shows the request for half a minute. */
@@ -270,7 +270,7 @@ const releaseHidden = () => release(t("released_hidden"), Cause.HIDDEN);
 /** Release control if this tab has it; every page shows the cause. */
 export async function release(text: string = t("released"), cause?: Cause): Promise<void> {
   const state = control.state.peek();
-  if (state.phase === "asking") state.unwanted = true;
+  if (state.phase === "asking") state.unwanted = { text, cause };
   if (state.phase !== "held") return;
   control.end();
   await giveBack(state.lease, text, cause);

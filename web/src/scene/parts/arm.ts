@@ -3,6 +3,7 @@
 import * as THREE from "three";
 import type { FrameTransforms } from "../../gen/foxglove/FrameTransforms_pb";
 import type { Description } from "../../gen/robomesh_pb";
+import { reasonOf } from "../../mesh/console/connection";
 import { FramePlayer } from "./frame-player";
 import type { Kind } from "./models";
 import { colourGhost, ghostOf, loadModel, paint, withMaterials } from "./models";
@@ -152,7 +153,7 @@ export async function loadOrReport(
     if (model) failed("");
     return model;
   } catch (error) {
-    failed(error instanceof Error ? error.message : String(error));
+    failed(reasonOf(error));
     return null;
   }
 }

@@ -6,7 +6,7 @@ import { Button } from "../../../ui/button";
 import type { Description } from "../description/description";
 import { jointUnit, linkNames } from "../description/description";
 import { unusedName } from "../description/edits";
-import { draft, editDraft, setValue } from "../draft/draft";
+import { draft, editDraft } from "../draft/draft";
 import { NumberField, PoseFields, ProblemWords, Section, SelectField, TextField } from "../draft/fields";
 
 export function FramesTab() {
@@ -63,6 +63,7 @@ export function ConstraintsTab() {
                   key={name}
                   path={`${path}/joints/${name}`}
                   label={d("factor_of", { joint: name })}
+                  value={constraint.joints[name] ?? 0}
                   set={(value) => setFactor(index, name, value)}
                 />
               ))}
@@ -81,8 +82,11 @@ export function ConstraintsTab() {
 /** Set a joint's factor in a constraint; 0: the joint is no part of it. */
 function setFactor(index: number, joint: string, factor: number): void {
   const path = `constraint/${index}/joints/${joint}`;
-  if (factor !== 0) setValue(path, factor);
-  else editDraft(({ description }) => void delete description.constraint[index]?.joints[joint], path);
+  editDraft(({ description }) => {
+    const factors = description.constraint[index]?.joints;
+    if (factors && factor !== 0) factors[joint] = factor;
+    else delete factors?.[joint];
+  }, path);
 }
 
 function Intro(props: { words: string; does: string; add: (to: Description) => void; disabled?: boolean }) {

@@ -136,10 +136,10 @@ export function Conflict(props: { robotKey: string; mine: ProgramContent; theirs
   };
   return (
     <>
-      <p class="stored-words" role="alert">
+      <p role="alert">
         <span class="shape warning" aria-hidden="true" /> <strong>{s("conflict", values)}</strong>
       </p>
-      <p class="stored-words">{s("conflict_words", values)}</p>
+      <p>{s("conflict_words", values)}</p>
       <div class="stored-tools">
         <Button text={s("use_theirs")} onClick={() => open(theirs)} />
         <Button primary text={s("use_mine")} onClick={() => void useMine()} />
@@ -160,7 +160,7 @@ export function RunText({ content }: { content: ProgramContent }) {
         <Button text={s("export")} onClick={() => download(text, name)} />
         <Button text={s("open_version")} onClick={() => open(content)} />
       </div>
-      <p class="stored-words dim">{s("ran_by", { author: version?.author ?? "", time: timeOf(version) })}</p>
+      <p class="dim">{s("ran_by", { author: version?.author ?? "", time: timeOf(version) })}</p>
       <Difference oldText={text} newText={text} whole={text} />
     </>
   );

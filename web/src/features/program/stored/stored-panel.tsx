@@ -38,7 +38,7 @@ export function StoredPanel({ robotKey }: { robotKey: string }) {
         {now?.kind === "program" && <Versions key={now.content.program?.id} robotKey={robotKey} {...now} />}
         {now?.kind === "conflict" && <Conflict robotKey={robotKey} {...now} />}
         {now?.kind === "run" && <RunText content={now.content} />}
-        {now?.kind === "loading" && <p class="stored-words dim">{s("loading")}</p>}
+        {now?.kind === "loading" && <p class="dim">{s("loading")}</p>}
       </div>
     </Panel>
   );
@@ -68,7 +68,7 @@ function List({ robotKey }: { robotKey: string }) {
           take={(files) => void importFiles(files)}
         />
       </div>
-      {programs.length === 0 && <p class="stored-words dim">{s(stored.value ? "none" : "no_store")}</p>}
+      {programs.length === 0 && <p class="dim">{s(stored.value ? "none" : "no_store")}</p>}
       <ul class="stored-list" aria-label={s("programs")}>
         {programs.map((program) => {
           const { id, current } = program;
