@@ -18,7 +18,7 @@ from robomesh.contract.endpoints import router_config
 from robomesh.publications.publisher import Publisher
 from robomesh.wire.session import Session, SessionSettings
 from tests.distribution import place
-from tests.ports import free_port as free_port
+from tests.ports import free_port
 
 T = TypeVar("T")
 

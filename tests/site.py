@@ -15,7 +15,7 @@ from typing import Any
 
 from robomesh.wire.session import SessionSettings
 from tests import warm
-from tests.conftest import free_port
+from tests.ports import free_port
 
 READY_S = 60.0
 PROGRAM = (sys.executable, "-m", "services.command_line.main")

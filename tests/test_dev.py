@@ -256,7 +256,7 @@ def test_parts_that_are_installed_are_known(dev, monkeypatch, tmp_path, stamp, p
         ("python examples/home.py", False),
         ("python -m pytest", True),
         ("python tests/make_topics.py", True),
-        ("python benchmarks/latency.py", True),
+        ("python -m benchmarks latency", True),
         ("mypy", True),
     ],
 )

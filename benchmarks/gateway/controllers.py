@@ -28,12 +28,13 @@ from typer import Option
 
 import robomesh
 from benchmarks.harness.burners import burning
-from benchmarks.harness.processes import cpu_s, free_port, process, until
+from benchmarks.harness.processes import cpu_s, process, until
 from benchmarks.harness.program import chosen
 from benchmarks.harness.sites import Site, running_site
 from benchmarks.harness.turns import summary
 from robomesh.contract.endpoints import client_config
 from robomesh.schemas import robomesh_pb2 as schema
+from tests.ports import free_port
 
 _PULSES = [1000.0] * 6
 _STOP_EACH_S = 0.15  # those within 0.1 s are one

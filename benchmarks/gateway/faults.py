@@ -20,12 +20,13 @@ from typing import Annotated, Any
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from typer import Option
 
-from benchmarks.harness.processes import free_port, program
+from benchmarks.harness.processes import program
 from benchmarks.harness.program import ROOT, chosen
 from benchmarks.harness.sites import ROBOMESH, robot, running_site
 from robomesh.contract.keys import robot_key
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
+from tests.ports import free_port
 
 STATE = schema.ControllerState
 LONGEST_S = 20.0

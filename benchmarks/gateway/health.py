@@ -13,13 +13,13 @@ from collections.abc import Callable
 import zenoh
 from prometheus_client import CollectorRegistry, generate_latest
 
-from benchmarks.harness.processes import free_port
 from robomesh.contract.endpoints import router_config
 from robomesh.requests.server import Request
 from robomesh.schemas.robomesh_pb2 import LeaseAnswer
 from robomesh.service.health import Served, health_of
 from robomesh.service.metrics import SessionMetrics
 from robomesh.wire.session import Session, SessionSettings, open_session
+from tests.ports import free_port
 
 _TOPICS = ("joints", "joints/slow", "controller", "raw", "lease", "events", "audit", "program")
 _REQUESTS = ("lease/request/*", "command/*", "audit/find")

@@ -9,12 +9,13 @@ from typing import Any
 
 import zenoh
 
-from benchmarks.harness.processes import free_port, process, until, until_connectable
+from benchmarks.harness.processes import process, until, until_connectable
 from benchmarks.harness.sites import robot, running_site
 from benchmarks.harness.turns import summary
 from benchmarks.harness.unit_controllers import RATE_HZ, number_of, running_controllers
 from robomesh.contract.endpoints import client_config
 from robomesh.schemas.robomesh_pb2 import ControllerState
+from tests.ports import free_port
 
 READERS = 63
 PAIRS = 10

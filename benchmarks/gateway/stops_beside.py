@@ -36,7 +36,7 @@ from typer import Option
 
 from benchmarks.gateway.floods import FLOODS, run
 from benchmarks.harness.burners import burn
-from benchmarks.harness.processes import free_port, piped, process, until_connectable
+from benchmarks.harness.processes import piped, process, until_connectable
 from benchmarks.harness.program import chosen
 from benchmarks.harness.sites import Site, robot, running_site
 from benchmarks.harness.turns import percentile
@@ -46,6 +46,7 @@ from robomesh.contract.topics import Role
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
 from services.pki import Folder, site_keys
+from tests.ports import free_port
 
 ROBOTS = ("arm", "other")
 IN_TRANSIT_NS = 100_000_000

@@ -12,8 +12,6 @@ from typing import Any
 
 import psutil
 
-from tests.ports import free_port as free_port
-
 START_S = 240.0  # on a busy machine a process takes a minute to start
 ENDS_WITHIN_S = 10.0
 
@@ -43,7 +41,7 @@ def piped(target: Callable[..., Any], *arguments: Any) -> Iterator[Connection]:
 
 
 @contextlib.contextmanager
-def program(*words: str, **options: Any) -> "Iterator[subprocess.Popen[bytes]]":
+def program(*words: str, **options: Any) -> Iterator[subprocess.Popen[bytes]]:
     """Run a program without its output while the block runs."""
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     running = subprocess.Popen(words, **(quiet | options))

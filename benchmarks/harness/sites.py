@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.harness.processes import free_port, program, until_connectable
+from benchmarks.harness.processes import program, until_connectable
 from benchmarks.harness.program import ROOT
+from tests.ports import free_port
 
 ROBOMESH = (sys.executable, "-m", "services.command_line.main")
 

@@ -27,12 +27,13 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from typer import Option
 
 import robomesh
-from benchmarks.harness.processes import free_port, piped
+from benchmarks.harness.processes import piped
 from benchmarks.harness.turns import in_turns
 from robomesh.contract.endpoints import client_config, router_config
 from robomesh.publications.publisher import Publisher
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
+from tests.ports import free_port
 
 JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
 KEY = "robomesh/bench/arm/joints"

@@ -38,10 +38,11 @@ import psutil
 from typer import Option
 
 from benchmarks.harness.processes import cpu_s as processor_s
-from benchmarks.harness.processes import free_port, until_connectable
+from benchmarks.harness.processes import until_connectable
 from benchmarks.harness.program import ROOT, chosen, say
 from benchmarks.harness.sites import ROBOMESH
 from benchmarks.mesh.fanout_sent import prepared
+from tests.ports import free_port
 
 HERE = Path(__file__)
 ARMS = ("robomesh", "zenoh", "page", "pyzmq", "nats", "foxglove", "robomesh-plain", "page-plain")

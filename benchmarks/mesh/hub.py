@@ -21,9 +21,10 @@ import psutil
 import zenoh
 from typer import Option
 
-from benchmarks.harness.processes import cpu_s, free_port, piped, process, rss_mib, until, until_connectable
+from benchmarks.harness.processes import cpu_s, piped, process, rss_mib, until, until_connectable
 from robomesh.contract.endpoints import client_config, router_config
 from robomesh.contract.topics import REQUESTS, TOPICS
+from tests.ports import free_port
 
 SERVICES = ("gateway", "kinematics", "renderer", "recorder")
 

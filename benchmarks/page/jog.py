@@ -38,7 +38,7 @@ import psutil
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import robomesh
-from benchmarks.harness.processes import free_port, program, until_connectable
+from benchmarks.harness.processes import program, until_connectable
 from benchmarks.harness.program import ROOT, chosen, say
 from benchmarks.harness.sites import ROBOMESH, robot, running_site
 from benchmarks.harness.tables import word
@@ -49,6 +49,7 @@ from robots.kinematics.model import build_model, tool_placement
 from tests.browser.conftest import ARGUMENTS, CHROMIUM
 from tests.browser.hand import COVER, KINDS, SHOW_DIALOG, UNCOVER, Hand
 from tests.browser.robot_page import take
+from tests.ports import free_port
 from web import build_page
 
 BY_HAND = ("release", "left", "other", "cancel", "blur", "dialog", "covered", "wheel", "scroll", "taps")

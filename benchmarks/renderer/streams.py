@@ -21,7 +21,7 @@ import zenoh
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from typer import Option
 
-from benchmarks.harness.processes import cpu_s, free_port, process
+from benchmarks.harness.processes import cpu_s, process
 from renderer import service
 from robomesh.contract.endpoints import router_config
 from robomesh.contract.quotas import DEFAULT_QUOTAS
@@ -29,6 +29,7 @@ from robomesh.schemas.robomesh_pb2 import View, ViewAnswer, ViewRequest
 from robomesh.wire.session import Session, SessionSettings, open_session
 from services import kinematics
 from tests.cells import single_arm
+from tests.ports import free_port
 
 JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
 VIEWS = ("front", "top", "left", "free")

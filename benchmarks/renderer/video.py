@@ -25,7 +25,7 @@ from playwright.async_api import async_playwright
 from typer import Option
 from websockets.asyncio.client import connect
 
-from benchmarks.harness.processes import cpu_s, free_port, process
+from benchmarks.harness.processes import cpu_s, process
 from benchmarks.harness.sites import Site, robot, running_site
 from benchmarks.harness.turns import summary
 from benchmarks.harness.unit_controllers import wait
@@ -34,6 +34,7 @@ from robomesh.schemas.robomesh_pb2 import FromPage, ToPage
 from robomesh.wire.session import SessionSettings, open_session
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of
+from tests.ports import free_port
 from web import build_page
 
 RATE_HZ = 100

@@ -30,12 +30,12 @@ import numpy as np
 import psutil
 from typer import Argument, Option
 
-from benchmarks.harness.processes import free_port
 from benchmarks.harness.program import ROOT, say
 from benchmarks.harness.sites import ROBOMESH
 from benchmarks.mesh.fanout_parts import HEADER, WebSocketReader, connected
 from robomesh.schemas.robomesh_pb2 import FromPage
 from robomesh.wire.session import Session, SessionSettings, open_session
+from tests.ports import free_port
 
 SITE = "soak"
 LOOK_EACH_S = 60.0

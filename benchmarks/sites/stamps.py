@@ -29,11 +29,12 @@ from mcap.reader import make_reader
 from typer import Argument
 
 from benchmarks.harness.burners import burning
-from benchmarks.harness.processes import free_port, until
+from benchmarks.harness.processes import until
 from benchmarks.harness.sites import ROBOMESH
 from benchmarks.sites.soak import SITE, Ports, site_file, up
 from robomesh.schemas.robomesh_pb2 import RecorderRequest, Recording
 from robomesh.wire.session import Session, SessionSettings, open_session
+from tests.ports import free_port
 
 RECORDED = "arm-0"
 CLOSED_WITHIN_S = 60.0

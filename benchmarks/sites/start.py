@@ -31,11 +31,11 @@ from typing import Annotated, Any
 import zenoh
 from typer import Option
 
-from benchmarks.harness.processes import free_port
 from benchmarks.harness.program import ROOT
 from benchmarks.harness.sites import ROBOMESH
 from robomesh.contract.endpoints import client_config
 from services.command_line.service_settings.table import SERVICES
+from tests.ports import free_port
 
 SITE = """site = "bench"
 [router]

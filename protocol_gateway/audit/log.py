@@ -3,14 +3,14 @@
     append          entry of a request before it is executed: on disk, or an error
     append_later    entry of a past event: kept in memory until the disk takes it
 
-Entries are in the order of the calls. `entry` defines a line, `files` the files of a log and its
-verification, `search` the search. When the live file has reached its size, it becomes an older part, and a
-new file continues the chain:
+Entries are in the order of the calls. `authority.audit_entry` defines a line, `files` the files of a log and
+its verification, `search` the search. When the live file has reached its size, it becomes an older part, and
+a new file continues the chain:
 
     create new file, lock it, write ROTATE -> link the live file under the part's name -> rename the new file
 
-A crash at any step leaves one complete live file, which is never empty. The latch file (`latch`) is in the
-same folder, under the same lock.
+A crash at any step leaves one complete live file, which is never empty. The latch file (`latch_file`) is in
+the same folder, under the same lock.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""Decisions of a robot's authority, performed by `control`.
+"""Decisions of a robot's authority, performed by `execution.control`.
 
     decision                              result
     ------------------------------------  ---------------------------------------------------

@@ -16,8 +16,8 @@
     link restored    the latched stop on the wire -> audit later
     fate unknown     as a stop
 
-`control` performs the decisions: it hands over one command after the other, so that they reach the controller
-in the order of the audit log. Stops, HOLD, renewals and releases do not wait.
+`execution.control` performs the decisions: it hands over one command after the other, so that they reach the
+controller in the order of the audit log. Stops, HOLD, renewals and releases do not wait.
 """
 
 from collections.abc import Callable, Sequence

@@ -255,7 +255,7 @@ class Control:
                         result = self._perform(decision)
 
     def _perform(self, decision: decisions.Decision) -> Any:
-        """Perform an decision that waits for nothing, and return its result.
+        """Perform a decision that waits for nothing, and return its result.
 
         Raises:
             TypeError: If the decision must be awaited.

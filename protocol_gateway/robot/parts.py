@@ -47,8 +47,8 @@ def make_driver(
         relay: Callback with units for old client programs, if the settings have them.
 
     Raises:
-        GatewaySettingsError: If the driver refuses its settings, or has not the ports and recoveries that
-            they name.
+        GatewaySettingsError: If the driver refuses its settings, or lacks a port or a recovery that they
+            name.
     """
     try:
         driver = driver_maker(settings.protocol)(

@@ -1,4 +1,4 @@
 """What the gateway publishes of a robot: joints, state, signals, events; and the confirmed tool.
 
-No commands: `control` executes them.
+No commands: they belong to `execution`.
 """

@@ -45,7 +45,7 @@ class Key(NamedTuple):
 
     @property
     def last_chunk(self) -> str:
-        """The caller's name, of a request that has one; a view's, a process's."""
+        """Last chunk of the topic: most requests end with the caller, `video/*` with the view."""
         return self.topic.rpartition("/")[2]
 
 

@@ -574,7 +574,7 @@ def _row_name(name: str, rows: Mapping[str, object]) -> str | None:
     return None
 
 
-@lru_cache(4096)  # each message's
+@lru_cache(4096)  # called for each message
 def topic(name: str) -> Topic:
     """Return the row of a topic: `joints`, `video/top`.
 

@@ -12,6 +12,7 @@ from robomesh.recordings.errors import RecordingError
 # Endings: of a recording, and of one that is being rewritten.
 SUFFIX = ".mcap"
 INDEXING = ".indexing"
+FLIGHT_FOLDER = ".flight"
 # Channel with the robot's URDF for viewers; all other channels of our recorder are keys of the mesh.
 ROBOT_DESCRIPTION = "/robot_description"
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.:+-]*")

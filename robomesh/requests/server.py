@@ -55,7 +55,7 @@ class Request:
 
     Attributes:
         message: Message of the request's schema; None if the request has no schema.
-        chunk: The chunk in place of the row's first `*`: the operator, the view, the mesh.
+        chunk: The chunk in place of the row's first `*`: the operator, the view, the shape.
         received_s: Time of arrival, before any wait (monotonic).
         within_s: How long the caller waits from then on [s]; None: unknown.
     """
@@ -78,7 +78,7 @@ class _Arrived:
 
     Attributes:
         key: The key at this owner, also of a request with a wildcard.
-        chunk: As in `Request`.
+        chunk: As in `Request`; `*` for a refused wildcard.
         caller: The last chunk, by which requests are limited; `*` for any key with a wildcard.
         refused: Why the key is not that of a request; None: it is.
     """
@@ -135,7 +135,8 @@ class RequestServer:
         self._row = topics.request(name)
         self._own = keys.Key(site, robot, name)
         # Place of the chunk that the row leaves open, in a whole key.
-        self._chunk_at = [*str(self._own).split("/"), "*"].index("*")
+        chunks = str(self._own).split("/")
+        self._chunk_at = chunks.index("*") if "*" in chunks else None
         self._handler = handler
         self._on_refused = on_refused
         self._loop = asyncio.get_running_loop()
@@ -236,7 +237,7 @@ class RequestServer:
             query.drop()
             return None
         # Zenoh passes on only keys with as many chunks as the row's.
-        chunk = "".join(text.split("/")[self._chunk_at : self._chunk_at + 1])
+        chunk = "" if self._chunk_at is None else text.split("/")[self._chunk_at]
         try:
             key = keys.parse_key(text)
         except KeyNameError as error:

@@ -188,11 +188,10 @@ class Session:
         payload = b"" if request is None else request.SerializeToString()
         answers = await requests.ask_all(self.zenoh_session, asked, payload, timeout_s=timeout_s)
         # A refusal has the request's key instead of its owner's.
-        owners = (asked if each[0] == key else self.ignored.key(REPLY, each[0]) for each in answers)
         return [
             requests.answer_of(owner, answer, refused)
-            for owner, (_, answer, refused) in zip(owners, answers, strict=True)
-            if owner is not None
+            for text, answer, refused in answers
+            if (owner := asked if text == key else self.ignored.key(REPLY, text)) is not None
         ]
 
     async def last(self, key: str, *, timeout_s: float = 2.0) -> Message | None:

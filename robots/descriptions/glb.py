@@ -78,9 +78,9 @@ def shapes_glb(shapes: tuple[Shape, ...], *, cache: Path | None = None) -> bytes
     return _cached_glb(shapes, cache_folder() if cache is None else cache)
 
 
-def main_colors(geometries: Mapping[str, bytes]) -> dict[str, Color]:
+def main_colors(glbs: Mapping[str, bytes]) -> dict[str, Color]:
     """Return the main colour of each GLB that robomesh wrote."""
-    found = {name: _main_color_of(glb) for name, glb in geometries.items()}
+    found = {name: _main_color_of(glb) for name, glb in glbs.items()}
     return {name: color for name, color in found.items() if color is not None}
 
 
@@ -166,15 +166,15 @@ def _key(shapes: Sequence[Shape], files: Sequence[Sequence[Path]]) -> str:
     return digest.hexdigest()
 
 
-def _content(geometry: Path | Geometry, others: Sequence[Path]) -> Iterator[bytes]:
-    if isinstance(geometry, Path):
-        yield geometry.suffix.lower().encode()
-        for path in (geometry, *others):
+def _content(source: Path | Geometry, others: Sequence[Path]) -> Iterator[bytes]:
+    if isinstance(source, Path):
+        yield source.suffix.lower().encode()
+        for path in (source, *others):
             yield b"there" if path.is_file() else b"missing"
             yield path.read_bytes() if path.is_file() else b""
-        yield repr([os.path.relpath(path, geometry.resolve().parent) for path in others]).encode()
+        yield repr([os.path.relpath(path, source.resolve().parent) for path in others]).encode()
         return
-    pieces: list[Part | Wire] = [*geometry.parts, *geometry.wires]
+    pieces: list[Part | Wire] = [*source.parts, *source.wires]
     for piece in pieces:
         for field in fields(piece):
             value = getattr(piece, field.name)

@@ -154,9 +154,9 @@ def _copy_references(
             yield f"{place} names {address!r}, and so does another mesh for another file; one is copied"
 
 
-def _path_in_robot(geometry: str, taken: set[str]) -> str:
+def _path_in_robot(file: str, taken: set[str]) -> str:
     """Return an unused path for a shape below the robot's folder; unchanged if possible."""
-    path = PurePosixPath(geometry)
+    path = PurePosixPath(file)
     if path.is_absolute() or ".." in path.parts:
         path = PurePosixPath("meshes", path.name)
     wanted, number = path, 2

@@ -186,12 +186,8 @@ def _confined(tree: Tree, description: RobotDescription) -> Tree:
     """Return the tree with each shape file's references limited to its `folder_around`."""
 
     def confined(shape: Shape) -> Shape:
-        geometry = shape.source
-        return (
-            replace(shape, within=description.folder_around(geometry))
-            if isinstance(geometry, Path)
-            else shape
-        )
+        source = shape.source
+        return replace(shape, within=description.folder_around(source)) if isinstance(source, Path) else shape
 
     return replace(
         tree,

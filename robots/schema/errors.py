@@ -2,7 +2,7 @@
 
 RobotError
 ├── DescriptionError    a description cannot be used: file, key, value and what would be right
-├── ShapeError           a shape file cannot be read: file, place and what is wrong there
+├── ShapeError          a shape file cannot be read: file, place and what is wrong there
 ├── SaveError           a robot cannot be written to its folder
 │   └── RobotExistsError    a robot of that name exists
 ├── VerificationRecordError a file is no record of a verification

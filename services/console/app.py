@@ -125,7 +125,7 @@ def reach_warning(settings: Settings, host: str) -> str | None:
 
 
 class Hub:
-    """State that all pages share: subscriptions, presence, meshes, accounts."""
+    """State that all pages share: subscriptions, presence, shapes, accounts."""
 
     def __init__(
         self, session: Session, settings: Settings, *, exposed: bool, tls: ssl.SSLContext | None = None

@@ -154,7 +154,7 @@ class RobotRecorder:
                 raise RefusedError(codes.RECORDING_OPEN(robot=self._robot, name=open_name))
             now = datetime.now(UTC)
             name = check_name(name or now.strftime(f"{self._robot}-%H%M%S"))
-            self._names = STATES | _videos((self._settings.views or ()) if views is None else views)
+            self._names = STATES | _videos(self._settings.views if views is None else views)
             about = {"name": name, "started_by": started_by}
             try:
                 self.part = await self._files.open(self._path(name, 1), about, self._names)

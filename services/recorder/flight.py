@@ -17,7 +17,7 @@ from robomesh.contract.messages import decode
 from robomesh.contract.topics import Topic
 from robomesh.errors import MessageError, RefusedError
 from robomesh.recordings.errors import CaptureError
-from robomesh.recordings.names import SUFFIX
+from robomesh.recordings.names import FLIGHT_FOLDER, SUFFIX
 from robomesh.recordings.writing.capture import Capture, is_being_written
 from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
@@ -25,7 +25,6 @@ from services.recorder.captures import CaptureFiles, check_name
 from services.recorder.disk import error_text
 from services.recorder.file_writer import STATES, CaptureSink
 from services.recorder.finishing import Finisher, Job
-from services.recorder.reading.robot_series import FLIGHT_FOLDER
 from services.recorder.settings import MIB
 from services.recorder.settings import Flight as Settings
 

@@ -86,12 +86,13 @@ class Settings(Recorder):
 
     Attributes:
         robots: Robots that can be recorded from the start; others of the site once their gateway is online.
-        views: As in the site file; absent: none.
+        views: Views recorded by default, after the site file's default was applied.
         quotas: Quotas of each client that reads recordings.
         site_file: Text of the site file, attached to each recording; empty if there is none.
     """
 
     site: str
     robots: tuple[str, ...]
+    views: tuple[str, ...] = ()
     quotas: Quotas = DEFAULT_QUOTAS
     site_file: str = ""

@@ -1,4 +1,4 @@
-"""Robots' shapes as files, because RViz cannot fetch them from the shape."""
+"""Robots' shapes as files, because RViz cannot fetch them from the mesh."""
 
 import asyncio
 import hashlib

@@ -28,7 +28,7 @@ from services.console.websocket import shared_subscriptions
 from services.kinematics import kinematics
 from services.watch import watch
 from tests.cells import single_arm
-from tests.conftest import free_port
+from tests.ports import free_port
 from web import build_page
 
 CHROMIUM = Path("/usr/bin/chromium")

@@ -13,7 +13,7 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-from tests.conftest import free_port
+from tests.ports import free_port
 
 STARTED_S = 120.0
 ANSWERED_S = 60.0

@@ -27,7 +27,7 @@ from robots.kinematics.model import build_model, link_placements
 from services.viewers.layout import viewer_layout
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS
 from tests.compatibility.earlier import unpack
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import running_site, wait_until
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]

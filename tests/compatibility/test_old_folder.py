@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.compatibility.earlier import PASSWORD, unpack
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import lean, robomesh, running_file, wait_until
 
 pytestmark = pytest.mark.processes

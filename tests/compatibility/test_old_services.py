@@ -10,7 +10,7 @@ import pytest
 
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.compatibility.earlier import EarlierVersion, end, in_log, unpack
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.services.test_console import browse
 from tests.site import RATE_HZ, robomesh, wait_until
 

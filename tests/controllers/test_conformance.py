@@ -8,8 +8,9 @@ import pytest
 from protocol_gateway.gateway import RobotSettings
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
-from tests.conftest import free_port, run
+from tests.conftest import run
 from tests.controllers.conformance import SUBJECTS
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, gateway_process, refusal, until
 from tests.protocol_gateway.wire import wire
 

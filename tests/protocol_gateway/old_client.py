@@ -6,7 +6,7 @@ import contextlib
 from protocol_gateway.legacy.settings import LegacySettings
 from protocol_gateway.unit_protocol.records import AbsolutePositions, Error, Status
 from protocol_gateway.unit_protocol.stream import Malformed, UnitStream
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import gateway, simulator, until
 
 ME = "127.0.0.1"

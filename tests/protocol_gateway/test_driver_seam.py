@@ -23,7 +23,7 @@ from protocol_gateway.seam import (
 from protocol_gateway.seam.errors import LinkDownError, NotReadyError
 from robomesh import reason_codes as codes
 from robomesh.service.loop_turns import LONG_S, MeasuredLoop, turns_of
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.protocol_gateway.scripted_controller import endless_joints
 from tests.protocol_gateway.test_link import Seen, controller, end, until
 

@@ -14,7 +14,8 @@ from protocol_gateway.audit.log import read_entries
 from protocol_gateway.robot.robot import Robot
 from robomesh.contract.endpoints import router_config
 from robomesh.wire.session import SessionSettings
-from tests.conftest import free_port, last_value
+from tests.conftest import last_value
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 
 FAR = [2.4, 0.2, -0.2, 0.1, 0.5]

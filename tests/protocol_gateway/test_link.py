@@ -11,7 +11,7 @@ from protocol_gateway.link.link import ControllerLink, LinkSettings, LinkState
 from protocol_gateway.seam import JointsReceived, MalformedReceived, Refused, UnknownReceived
 from protocol_gateway.seam.errors import LinkCloggedError, LinkDownError
 from robots.kinematics.joints import JointType
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.protocol_gateway.scripted_controller import endless_joints
 
 STATE = b"1#ABSOLUTE.DEG*10.00;20.00@"

@@ -17,7 +17,7 @@ from robomesh.contract.endpoints import router_config
 from robomesh.contract.topics import Role
 from robomesh.wire.session import Session
 from services.pki import Folder, site_keys
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import ONE_ARM, lean, running_file, site_file, wait_until
 from tests.site import robomesh as command
 

@@ -9,7 +9,7 @@ import zenoh
 
 from robomesh.contract.endpoints import client_config, router_config, router_values
 from robomesh.wire.session import SessionSettings, open_session
-from tests.conftest import free_port
+from tests.ports import free_port
 
 
 async def no_answer(request):

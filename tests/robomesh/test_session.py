@@ -22,7 +22,8 @@ from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import MOST_OF_ONE, name_of
 from robomesh.wire.session import SessionSettings, open_session
-from tests.conftest import free_port, put_unheard
+from tests.conftest import put_unheard
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import until
 from tests.refusals import refused
 

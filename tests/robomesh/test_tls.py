@@ -10,7 +10,8 @@ from robomesh.contract.endpoints import Tls, router_config
 from robomesh.errors import SessionError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
-from tests.conftest import free_port, last_value
+from tests.conftest import last_value
+from tests.ports import free_port
 
 
 def certificates(authority: trustme.CA, folder: Path, name: str) -> Tls:

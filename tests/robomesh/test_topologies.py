@@ -9,7 +9,7 @@ import pytest
 import zenoh
 
 from robomesh.contract.endpoints import client_config, router_config
-from tests.conftest import free_port
+from tests.ports import free_port
 
 # Links of each site.
 TREE = {"hub": (), "a": ("hub",), "b": ("hub",), "c": ("b",)}

@@ -13,7 +13,7 @@ import pytest
 import robomesh
 from deploy.locked_parts import UNUSED
 from tests.check_platforms import PYTHONS
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import ONE_ARM, running_file, running_site, site_file, wait_until
 
 pytestmark = pytest.mark.processes

@@ -16,7 +16,7 @@ from services.pki import Folder, site_keys
 from services.ros2.service import serve as serve_ros2
 from services.ros2.settings import Settings as Ros2Settings
 from services.router.router import read_access
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import until
 from tests.services.foxglove_client import attached
 from tests.services.test_foxglove import ARM, bridge, joints

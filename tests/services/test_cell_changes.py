@@ -22,7 +22,8 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.cells.file import CellFile
 from services.kinematics.shown_cell import ShownCell
-from tests.conftest import free_port, last_value, run
+from tests.conftest import last_value, run
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import A, C, GatewaySite, kept_control, until
 from tests.refusals import refused
 from tests.services.cell_site import CellSite, cell_site, write_site

@@ -19,7 +19,8 @@ from services.command_line.service_settings.table import SERVICES
 from services.site_file.site import Site
 from services.site_file.tables.console import Console
 from services.site_file.tables.router import Router
-from tests.conftest import SHARED, free_port
+from tests.conftest import SHARED
+from tests.ports import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 # Command -> the options that the contract names.

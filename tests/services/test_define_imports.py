@@ -16,7 +16,7 @@ from robots.bodies.link_pairs import plan_of
 from robots.bodies.verdicts import IGNORED
 from robots.descriptions.description import load
 from robots.descriptions.urdf.write import to_urdf
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.robots.test_step import step_box
 from tests.services.defining import defining
 

@@ -25,7 +25,7 @@ from services.console.define.routes import Define
 from services.console.define.settings import DefineSettings
 from services.site_file.site import Define as DefinePart
 from services.site_file.site import Site
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.services.defining import defining
 from tests.site import wait_until
 

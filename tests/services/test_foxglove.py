@@ -18,7 +18,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
 from services.foxglove.server import serve
 from services.foxglove.settings import Settings
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import STATE, gateway, simulator
 from tests.services.foxglove_client import attached
 

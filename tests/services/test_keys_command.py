@@ -23,7 +23,7 @@ from services.pki.errors import KeysError
 from services.router.router import read_access
 from services.site_file.site import load
 from services.site_file.started_robots import may_start
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import ONE_ARM, robomesh, running_site, site_file, wait_until
 
 

@@ -35,7 +35,7 @@ from services.ros2 import service as ros2
 from services.router.router import read_access
 from services.watch import watch
 from tests.cells import single_arm
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.renderer.bodies import context_or_skip
 
 pytestmark = pytest.mark.slow

@@ -13,12 +13,12 @@ from controllers import probing
 from controllers.probing import ProbeError
 from services.command_line.doctor import probe
 from services.command_line.doctor.probe import examine, probes
-from tests.conftest import free_port
 from tests.controllers.fanuc.ftp_site import controller as fanuc_by_ftp
 from tests.controllers.fanuc.test_snpx_driver import controller as fanuc
 from tests.controllers.opcua.test_opcua_driver import controller as opcua
 from tests.controllers.universal_robots.test_rtde_driver import controller as universal_robots
 from tests.controllers.yaskawa.test_hses_driver import controller as yaskawa
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import simulator
 
 

@@ -18,7 +18,7 @@ from services.command_line.service_settings.metrics_ports import ports, scrape_c
 from services.command_line.service_settings.table import SERVICES
 from services.pki import Folder, site_keys
 from services.site_file import site as site_file
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import ONE_ARM, kill, robomesh, running_site, wait_until
 
 DEPLOY = Path(__file__).resolve().parents[2] / "deploy"

@@ -14,7 +14,8 @@ from robomesh.wire.session import SessionSettings
 from services.command_line.control.send import joined
 from services.command_line.record.record import _interrupted, _record, _stop
 from services.command_line.terminal.discovery import RobotAddress
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 from tests.services.recording import put_states, recording_site, trace_off
 from tests.services.test_recorder import fill_disk_under
 

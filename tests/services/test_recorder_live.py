@@ -15,7 +15,8 @@ from robomesh.recordings.files import describe_file
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings
 from services.recorder.settings import FreeSpace, Split
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 from tests.refusals import refused
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
 

@@ -17,7 +17,8 @@ from robomesh.contract.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings
 from services.recorder.attachments import without_secrets
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
 
 STATES, PICTURES = 100, 60

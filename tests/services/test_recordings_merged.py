@@ -24,7 +24,8 @@ from robomesh.recordings.writing.recover import State, recover, state_of
 from robomesh.wire.session import SessionSettings
 from services.command_line.main import run as command
 from services.player.recording_source import RecordingSource
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 from tests.recordings import START_NS, Written, joints, merge, write_capture
 from tests.services.recording import put_states, recording_site, trace_off, trace_on, until, until_indexed
 from tests.services.test_recordings_elsewhere import counted

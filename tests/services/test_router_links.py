@@ -14,7 +14,7 @@ from robomesh.contract.topics import Role
 from services.pki import certificates, site_keys
 from services.router.rolling_restart import neighbours, wait_for_turn
 from services.router.router import read_access
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.services.test_router_rules import attached, names, prepared, routing, settings_of, until
 
 

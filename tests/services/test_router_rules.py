@@ -17,7 +17,8 @@ from robomesh.wire.session import CERTIFICATE, SessionSettings, open_session
 from services import router as service
 from services.pki import Folder, certificates, renewals, site_keys
 from services.router.router import AccessError, read_access
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 
 pytestmark = pytest.mark.slow
 

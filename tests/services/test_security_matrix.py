@@ -15,7 +15,7 @@ from robomesh.contract.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
 from robomesh.errors import KeyNameError
 from services.pki import Folder, site_keys
 from services.router.router import read_access
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import wait_until
 
 SITE, OTHER_SITE, HUB = "here", "there", "hub"

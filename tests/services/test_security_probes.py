@@ -17,7 +17,8 @@ from robomesh.wire.session import SessionSettings, open_session
 from services.command_line.doctor import security
 from services.pki import Folder, site_keys
 from services.router.router import read_access
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 
 SITE, ARM = "hall", "robomesh/hall/arm"
 

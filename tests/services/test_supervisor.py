@@ -14,7 +14,8 @@ import pytest
 
 from services import supervisor
 from services.supervisor import CouldNotStartError, SupervisedProgram, _lines, supervise
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 from tests.site import alive, wait_until
 
 FORKING = """

@@ -22,8 +22,8 @@ from robomesh.service import service
 from services.command_line.commands import COMMANDS, load
 from services.command_line.service_settings.table import SERVICES
 from tests import warm
-from tests.conftest import free_port
 from tests.hostile import IDENTITY, SEQUENCES, UNKNOWN, Values, publisher
+from tests.ports import free_port
 
 # One worker runs this file, so that every command runs once for each kind of publisher.
 pytestmark = pytest.mark.processes

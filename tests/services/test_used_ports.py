@@ -18,7 +18,7 @@ from services.router.router import Settings, check_ports_free, serve
 from services.site_file.site import Site
 from services.site_file.tables.console import Console
 from services.used_ports import check_free
-from tests.conftest import free_port
+from tests.ports import free_port
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from robomesh.service.health import own_version
 from services.command_line.commands import COMMANDS
 from services.command_line.main import run
-from tests.conftest import free_port
+from tests.ports import free_port
 
 PROGRAM = Path(sys.executable).with_name("robomesh")
 

@@ -15,7 +15,7 @@ from robomesh.service.clock import answer_clock
 from robomesh.service.health import Served, present
 from robomesh.wire.session import SessionSettings, open_session
 from services.watch.watch import Settings, serve
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.refusals import refused
 
 State = schema.ControllerState

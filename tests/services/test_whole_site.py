@@ -21,7 +21,8 @@ from robomesh.contract.topics import topic
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.errors import TRY_AGAIN
-from tests.conftest import free_port, last_value, run
+from tests.conftest import last_value, run
+from tests.ports import free_port
 from tests.refusals import refused
 from tests.site import ONE_ARM, alive, kill, robomesh, running_site, site_file, wait_until
 

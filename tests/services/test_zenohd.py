@@ -13,7 +13,8 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from robomesh.wire.session import SessionSettings, open_session
 from services import router as service
 from services.pki import Folder, site_keys
-from tests.conftest import free_port, run
+from tests.conftest import run
+from tests.ports import free_port
 from tests.site import robomesh, wait_until
 
 SITE = "here"

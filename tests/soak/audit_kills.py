@@ -32,7 +32,7 @@ from robomesh.contract.endpoints import router_config
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
-from tests.conftest import free_port
+from tests.ports import free_port
 
 C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action

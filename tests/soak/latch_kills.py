@@ -33,7 +33,7 @@ from protocol_gateway.audit.log import read_entries, verify
 from robomesh.contract.endpoints import router_config
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.soak.audit_kills import Controller
 
 STATE = schema.ControllerState

@@ -34,7 +34,7 @@ from robomesh.errors import NoAnswerError
 from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
-from tests.conftest import free_port
+from tests.ports import free_port
 
 MIB = 1 << 20
 SIZE_MIB, WARN_MIB, VIDEO_MIB, STATES_MIB = 48, 40, 24, 8

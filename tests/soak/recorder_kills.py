@@ -33,7 +33,7 @@ from robomesh.recordings import records
 from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
-from tests.conftest import free_port
+from tests.ports import free_port
 
 KEY = "robomesh/kills/arm/recorder/request"
 JOINTS = "robomesh/kills/arm/joints"

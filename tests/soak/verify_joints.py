@@ -28,7 +28,7 @@ from controllers.universal_robots.simulated import service as universal_robots
 from controllers.yaskawa.simulated import service as yaskawa
 from robots.descriptions.description import LIBRARY, RobotDescription, load
 from robots.kinematics.joints import FloatArray, joints_of
-from tests.conftest import free_port
+from tests.ports import free_port
 from tests.site import lean, robomesh, running_file, site_file
 
 MODEL = "puma560"

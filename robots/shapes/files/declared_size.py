@@ -17,7 +17,7 @@ from robots.shapes.files.text_repair import check_instances, counted_from_first,
 
 # A robot's link is far smaller. The console reads uploaded files, so the limits must be firm.
 MAX_BYTES = 1 << 30
-# trimesh makes a shape for each material, which takes milliseconds.
+# trimesh makes a `Trimesh` for each material, which takes milliseconds.
 _MOST_MATERIALS = 2000
 
 

@@ -1,6 +1,6 @@
 """DXF reader: the model space of a file that ezdxf has parsed, with blocks expanded.
 
-    3DFACE, SOLID, TRACE, POLYLINE (polyface, polygon shape), MESH     triangles
+    3DFACE, SOLID, TRACE, POLYLINE (polyface, polygon mesh), MESH     triangles
     LINE, LWPOLYLINE, POLYLINE, CIRCLE, ARC, ELLIPSE, SPLINE, POINT   wires
     INSERT                                                            its block, once per row and column
     3DSOLID, BODY, REGION, SURFACE                                    named in a warning: they are ACIS

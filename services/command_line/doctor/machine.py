@@ -48,7 +48,7 @@ _ANSWER_S = 3.0
 
 
 @dataclass(frozen=True)
-class CheckResult:
+class MachineCheck:
     """The result of one check; `fix` says what to do if it failed."""
 
     what: str
@@ -58,7 +58,7 @@ class CheckResult:
 
 
 def run(site_file: Path | None = None, as_json: bool = False) -> None:
-    """Print every finding; exit status 1 when something is missing.
+    """Print every result; exit status 1 when something is missing.
 
     Args:
         site_file: The site whose addresses are checked; None: the built-in site.
@@ -67,36 +67,36 @@ def run(site_file: Path | None = None, as_json: bool = False) -> None:
 
     site = load(site_file)
     checks = (_python, _extras, partial(_drivers, site), _open_gl, _page, partial(_addresses, site), _disk)
-    findings = [finding for check in checks for finding in check()]
+    results = [result for check in checks for result in check()]
     if as_json:
-        rows = [{"what": each.what, "ok": each.ok, "text": each.text, "mend": each.fix} for each in findings]
-        print_json({"ok": all(each.ok for each in findings), "findings": rows})
-    for finding in () if as_json else findings:
-        print_line(f"{'ok     ' if finding.ok else 'MISSING'}  {finding.what}: {finding.text}")
-        if not finding.ok:
-            print_line(f"         {finding.fix}")
-    if not all(finding.ok for finding in findings):
+        rows = [{"what": each.what, "ok": each.ok, "text": each.text, "mend": each.fix} for each in results]
+        print_json({"ok": all(each.ok for each in results), "findings": rows})
+    for result in () if as_json else results:
+        print_line(f"{'ok     ' if result.ok else 'MISSING'}  {result.what}: {result.text}")
+        if not result.ok:
+            print_line(f"         {result.fix}")
+    if not all(result.ok for result in results):
         raise typer.Exit(1)
 
 
-def _python() -> list[CheckResult]:
+def _python() -> list[MachineCheck]:
     version = ".".join(map(str, sys.version_info[:3]))
-    return [CheckResult("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")]
+    return [MachineCheck("Python", sys.version_info >= (3, 11), version, "install Python 3.11 or newer")]
 
 
-def _extras() -> list[CheckResult]:
-    findings = []
+def _extras() -> list[MachineCheck]:
+    results = []
     for extra, packages in _EXTRAS.items():
         missing = [package for package in packages if is_missing(package)]
         fix, rare = install_command(extra), extra in ADDED_IN_CHECKOUT
         text = "its packages are installed" if not missing else f"no {', '.join(missing)}"
         if missing and rare:
             text = f"not installed; {fix} installs it"
-        findings.append(CheckResult(f"{'part' if rare else 'role'} {extra}", rare or not missing, text, fix))
-    return findings
+        results.append(MachineCheck(f"{'part' if rare else 'role'} {extra}", rare or not missing, text, fix))
+    return results
 
 
-def _drivers(site: "Site") -> Iterator[CheckResult]:
+def _drivers(site: "Site") -> Iterator[MachineCheck]:
     """Yield whether the site's drivers of packages can be used."""
     for protocol in sorted({robot.protocol for robot in site.robot} - own_kinds().keys()):
         what, fix = f"protocol {protocol}", "correct the package, or install it again"
@@ -104,44 +104,44 @@ def _drivers(site: "Site") -> Iterator[CheckResult]:
             kind = kind_of(protocol)
             if missing := [module for module in kind.packages if is_missing(module)]:
                 install = install_command(kind.extra, kind.distribution)
-                yield CheckResult(what, False, f"no {', '.join(missing)}", install)
+                yield MachineCheck(what, False, f"no {', '.join(missing)}", install)
                 continue
             driver_maker(protocol)
             part_of(protocol, "simulated", Simulated)
         except GatewaySettingsError as error:
-            yield CheckResult(what, False, str(error), fix)
+            yield MachineCheck(what, False, str(error), fix)
         else:
-            yield CheckResult(what, True, f"the package {kind.distribution} is installed")
+            yield MachineCheck(what, True, f"the package {kind.distribution} is installed")
 
 
-def _open_gl() -> list[CheckResult]:
+def _open_gl() -> list[MachineCheck]:
     fix = "apt-get install libegl1 libgl1; everything but the renderer runs without it"
     try:
         from renderer.drawing.opengl import device_name, device_names, open_context
         from renderer.errors import RendererError
     except ImportError as error:
-        return [CheckResult("OpenGL", False, f"its packages are missing: {error}", fix)]
+        return [MachineCheck("OpenGL", False, f"its packages are missing: {error}", fix)]
     try:
         context = open_context()
     except RendererError as error:
-        return [CheckResult("OpenGL", False, str(error), fix)]
+        return [MachineCheck("OpenGL", False, str(error), fix)]
     name = device_name(context)
     context.release()
     devices = device_names()
     listed = "; ".join(f"device {number}: {each}" for number, each in enumerate(devices))
     return [
-        CheckResult("OpenGL", True, f"off screen, by {name}" + (f" ({listed})" if len(devices) > 1 else ""))
+        MachineCheck("OpenGL", True, f"off screen, by {name}" + (f" ({listed})" if len(devices) > 1 else ""))
     ]
 
 
-def _page() -> list[CheckResult]:
+def _page() -> list[MachineCheck]:
     from services.console.app import PAGE
 
     built = (PAGE / "index.html").exists()
-    return [CheckResult("page", built, "built" if built else "not built", "./dev up builds it")]
+    return [MachineCheck("page", built, "built" if built else "not built", "./dev up builds it")]
 
 
-def _addresses(site: "Site") -> Iterator[CheckResult]:
+def _addresses(site: "Site") -> Iterator[MachineCheck]:
     """Yield whether each address of the site can be listened on, or a running site uses it."""
     metered = first_address(site, "")
     uses: list[tuple[str, str, int, Callable[[], bool]]] = [
@@ -168,20 +168,20 @@ def _addresses(site: "Site") -> Iterator[CheckResult]:
     for what, host, port, is_ours in uses:
         if is_absent(host):
             text, fix = "is not this machine's address now", "bring its network up, or correct the site file"
-            yield CheckResult(what, False, f"{host}:{port} {text}", fix)
+            yield MachineCheck(what, False, f"{host}:{port} {text}", fix)
             continue
         try:
             check_free(what, host, port, _OTHER)
         except UnavailableError as error:
             ours = is_ours()
-            yield CheckResult(
+            yield MachineCheck(
                 what,
                 ours,
                 f"{host}:{port} is used by a running site" if ours else str(error).partition(". End")[0],
                 _END,
             )
         else:
-            yield CheckResult(what, True, f"{host}:{port} is free")
+            yield MachineCheck(what, True, f"{host}:{port} is free")
 
 
 def _is_router(endpoint: str) -> bool:
@@ -210,11 +210,11 @@ def _serves(url: str, mark: bytes) -> bool:
         return False
 
 
-def _disk() -> list[CheckResult]:
+def _disk() -> list[MachineCheck]:
     free = shutil.disk_usage(".").free
     writable = os.access(".", os.W_OK)
     return [
-        CheckResult(
+        MachineCheck(
             "disk",
             writable and free > _FREE_BYTES,
             f"{free / 1e9:.1f} GB free here" + ("" if writable else ", and not writable"),

@@ -1,4 +1,4 @@
-"""`robomesh recordings`: its commands, in the order of `--help`, and `export`."""
+"""Commands of `robomesh recordings`, in the order of `--help`. `export/` does the work of `export`."""
 
 from pathlib import Path
 from typing import Annotated

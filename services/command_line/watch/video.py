@@ -52,7 +52,7 @@ def video(
         raise VideoError(f"--seconds {seconds:g}: must be 0 (until Ctrl-C) or more")
     file = _File(out)
     try:
-        discovery.run(_save(robot, view, file, (width, height, fps), seconds, connect))
+        discovery.run(_save(robot, view, file, seconds, connect, width=width, height=height, fps=fps))
     except (Mp4Error, VideoError) as error:
         raise VideoError(f"{error}; {file.words}") from None
     finally:
@@ -122,11 +122,10 @@ class _File:
 
 
 async def _save(
-    name: str, view: str, file: _File, wanted: tuple[int, int, float], seconds: float, router: str
+    name: str, view: str, file: _File, seconds: float, router: str, *, width: int, height: int, fps: float
 ) -> None:
     async with discovery.attached(router) as session:
         robot = await discovery.find(session, name)
-        width, height, fps = wanted
         keys = await view_of(session, robot, view, width=width, height=height, fps=fps)
         file.fps = keys.fps
         video = session.subscribe(keys.video, newest=_NEWEST, history=False)

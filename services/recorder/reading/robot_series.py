@@ -16,7 +16,7 @@ from robomesh import reason_codes as codes
 from robomesh.contract.keys import check_name
 from robomesh.errors import KeyNameError
 from robomesh.recordings.errors import RecordingError
-from robomesh.recordings.names import SUFFIX
+from robomesh.recordings.names import FLIGHT_FOLDER, SUFFIX
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series.downsampling import (
     MOST_POINTS,
@@ -32,7 +32,6 @@ from robomesh.recordings.series.values import topic_of
 from robomesh.recordings.writing.capture import is_being_written
 from robomesh.schemas import robomesh_pb2 as schema
 
-FLIGHT_FOLDER = ".flight"
 _LONGEST_H = 24
 _SECOND_NS = 1_000_000_000
 # Closed files are read once, into intervals of at least this length. A closer view reads the file again: its

@@ -27,8 +27,8 @@ from protocol_gateway.seam import (
 )
 from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robots.kinematics.joints import JointType
-from tests.conftest import free_port
 from tests.controllers.simulated_site import running
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, until
 
 DEGREE, RADIAN, MILLIMETRE = (Unit(number_of(code), code) for code in ("DD", "C81", "MMT"))

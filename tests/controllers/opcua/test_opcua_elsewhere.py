@@ -18,8 +18,9 @@ from controllers.opcua.settings import OpcUaSettings
 from protocol_gateway.link.link import ControllerLink, LinkSettings
 from protocol_gateway.seam import JointsReceived, SignalsReceived
 from robots.kinematics.joints import JointType
-from tests.conftest import free_port, run
+from tests.conftest import run
 from tests.controllers.opcua.test_opcua_driver import controller
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import until
 from tests.protocol_gateway.scripted_controller import endless_joints
 

@@ -38,8 +38,9 @@ from robomesh.wire.session import open_session
 from robots.descriptions.description import load
 from robots.kinematics.joints import JointType
 from robots.kinematics.model import build_model, tool_placement
-from tests.conftest import free_port, last_value
+from tests.conftest import last_value
 from tests.controllers.simulated_site import running
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
 from tests.protocol_gateway.wire import wire
 

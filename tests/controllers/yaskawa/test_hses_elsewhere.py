@@ -17,8 +17,9 @@ from protocol_gateway.link.link import ControllerLink, LinkSettings
 from protocol_gateway.seam import JointsReceived, MalformedReceived, SignalsReceived, StatusReceived
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of, violations
-from tests.conftest import free_port, run
+from tests.conftest import run
 from tests.controllers.yaskawa.test_hses_simulator import simulator
+from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import until
 from tests.protocol_gateway.scripted_controller import endless_joints
 
