@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 SCRIPT = """
 const shown = [];
 for (const [language, reason, seconds] of asked) {
-  await page.showLanguage(language);
+  await page.showFirstLanguage(language);
   const given = { values: {}, causes: [], text: "", ...reason };
   given.causes = given.causes.map((cause) => ({ values: {}, causes: [], text: "", ...cause }));
   shown.push(page.reasonText(seconds ? page.withValue(given, "seconds", seconds) : given));
