@@ -57,7 +57,7 @@ async def listen(
             await asyncio.sleep(4.0)  # shaders, meshes
         # On a busy machine the services need longer than that.
         async with asyncio.timeout(60.0):
-            while not joints.keys or (pictures is not None and not pictures.keys):
+            while not joints.received or (pictures is not None and not pictures.received):
                 await asyncio.sleep(0.1)
         await asyncio.sleep(1.0)
         taking = [asyncio.create_task(asyncio.to_thread(take_bare, subscriber, bare, units))]

@@ -77,19 +77,19 @@ async def listen(
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
         states = session.subscribe("robomesh/bench/*/kinematics", newest=10_000, history=False)
         taking = [asyncio.create_task(take(states, came))]
-        await asyncio.to_thread(until, lambda: len(states.keys) == robots)
+        await asyncio.to_thread(until, lambda: len(states.ages_s()) == robots)
         if checks:
             taking.append(asyncio.create_task(ask_checks(session, checked)))
         go.set()
         await asyncio.sleep(WARM_UP_S)
         came.clear()
         checked.clear()
-        lost_before = sum(states.lost(key) for key in states.keys)
+        lost_before = states.total_lost
         begun, cpu_before = time.monotonic(), cpu_s(process)
         await asyncio.sleep(seconds)
         took_s, cpu = time.monotonic() - begun, cpu_s(process) - cpu_before
         kept, memory = [*came], rss_mib(process)
-        lost = sum(states.lost(key) for key in states.keys) - lost_before
+        lost = states.total_lost - lost_before
         for task in taking:
             task.cancel()
         await asyncio.wait(taking)
