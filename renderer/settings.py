@@ -2,9 +2,10 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from robomesh.contract.keys import CLOSE, FAR
+from robots.schema.toml_table import TomlTable
 
 Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
 
@@ -12,7 +13,7 @@ Pixels = Annotated[int, Field(ge=64, le=4096, multiple_of=2)]
 ALWAYS_RENDERED = (CLOSE, FAR)
 
 
-class Renderer(BaseModel):
+class Renderer(TomlTable):
     """Rendered views, their size and quality.
 
     Attributes:
@@ -26,8 +27,6 @@ class Renderer(BaseModel):
         most_views: Largest number of requested views, for all robots together.
     """
 
-    # Unknown keys are errors, and so are NaN and infinity.
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     views: tuple[str, ...] = ("front", "top", "left", "free")
     # Even numbers: H.264 halves the resolution of colour.
     size: tuple[Pixels, Pixels] = (1280, 720)

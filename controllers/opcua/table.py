@@ -4,11 +4,12 @@ import re
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
 
 from controllers.opcua.settings import OpcUaJoint, OpcUaSettings, OpcUaSignal
 from protocol_gateway.seam import Signal
-from protocol_gateway.seam.table import PART_CONFIG, Declared, Table
+from protocol_gateway.seam.table import Declared, Table
+from robots.schema.toml_table import TomlTable
 
 _NODE = re.compile(r"(nsu=[^;]+;|ns=\d{1,5};)?(i=\d{1,10}|[sgb]=.+)")
 _MOST_SIGNALS = 200
@@ -20,7 +21,7 @@ def _node(text: str) -> str:
     return text
 
 
-class OpcUaJointPart(BaseModel):
+class OpcUaJointPart(TomlTable):
     """Source of a joint's position.
 
     Attributes:
@@ -32,7 +33,6 @@ class OpcUaJointPart(BaseModel):
         zero: Position of the joint [deg], or [mm], where the server reports 0.
     """
 
-    model_config = PART_CONFIG
     axis: Annotated[str, Field(max_length=200)] = ""
     node: str = ""
     unit: Literal["", "deg", "rad", "mm", "m"] = ""
@@ -48,7 +48,7 @@ class OpcUaJointPart(BaseModel):
         return self
 
 
-class OpcUaSignalPart(BaseModel):
+class OpcUaSignalPart(TomlTable):
     """Source of one signal.
 
     Attributes:
@@ -57,7 +57,6 @@ class OpcUaSignalPart(BaseModel):
         unit: Unit as it is shown; absent: as the server states it, in SI.
     """
 
-    model_config = PART_CONFIG
     name: str
     node: str
     unit: Annotated[str, Field(max_length=16)] = ""

@@ -3,17 +3,18 @@
 from collections.abc import Sequence
 from typing import Annotated, TypeAlias
 
-from pydantic import BaseModel, Field, StrictBool, field_validator
+from pydantic import Field, StrictBool, field_validator
 
 from controllers.yaskawa.axes import MOST_AXES, Coupling, YaskawaSettings, instance_of, with_factors
 from protocol_gateway.seam.errors import GatewaySettingsError
-from protocol_gateway.seam.table import PART_CONFIG, Declared, Table
+from protocol_gateway.seam.table import Declared, Table
 from robots.kinematics.joints import JointType
+from robots.schema.toml_table import TomlTable
 
 _Axis: TypeAlias = Annotated[int, Field(ge=1, le=MOST_AXES, strict=True)]
 
 
-class CoupledAxis(BaseModel):
+class CoupledAxis(TomlTable):
     """Pulses that one joint's motion adds to another joint's axis, as in many wrists.
 
     Attributes:
@@ -22,7 +23,6 @@ class CoupledAxis(BaseModel):
         pulses_per_degree: Added pulses a degree of that joint; of a linear joint, a millimetre.
     """
 
-    model_config = PART_CONFIG
     joint: _Axis
     by: _Axis
     pulses_per_degree: float

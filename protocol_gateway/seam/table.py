@@ -5,12 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict
-
 from robots.schema.robot_toml import JointType
-
-# Unknown keys are errors, and so are NaN and infinity.
-PART_CONFIG = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+from robots.schema.toml_table import TomlTable
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,10 +25,8 @@ class Declared:
     stale_after_s: float | None
 
 
-class Table(BaseModel):
+class Table(TomlTable):
     """Base of the tables. The docstring of each describes its keys, in `Attributes`."""
-
-    model_config = PART_CONFIG
 
     def in_folder(self, folder: Path) -> Self:
         """Return the table with its files' paths relative to a folder."""

@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     PrivateAttr,
     StringConstraints,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
+
+from robots.schema.toml_table import TomlTable
 
 BASE_LINK = "base"
 TOOL_FRAME = "tool"
@@ -43,10 +43,8 @@ class JointType(StrEnum):
     PRISMATIC = "prismatic"
 
 
-class _Table(BaseModel):
-    """A table of the file: frozen, without unknown keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=False)
+class _Table(TomlTable):
+    """A table of the file; an error of an unknown key names the nearest known one."""
 
     @model_validator(mode="before")
     @classmethod

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Annotated
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AwareDatetime, Field, ValidationError
 
 from robomesh.contract.access_rights import Border, Principal
 from robomesh.contract.topics import Role
 from robots.schema.bounded_toml import parse_toml
+from robots.schema.toml_table import TomlTable
 from services.pki.errors import KeysError
 
-_ENTRY_CONFIG = ConfigDict(extra="forbid", frozen=True)
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]*\.[a-z0-9][a-z0-9_-]*$"
 _SITE = r"^([a-z0-9][a-z0-9_-]*|\*)$"
 _ROBOT = r"^[a-z0-9][a-z0-9_-]*$"
@@ -22,7 +22,7 @@ Site = Annotated[str, Field(pattern=_SITE)]
 Robot = Annotated[str, Field(pattern=_ROBOT)]
 
 
-class Entry(BaseModel):
+class Entry(TomlTable):
     """A principal: a name that has, or had, a certificate.
 
     Attributes:
@@ -32,7 +32,6 @@ class Entry(BaseModel):
         earlier: Latest expiry among the name's earlier certificates.
     """
 
-    model_config = _ENTRY_CONFIG
     name: Annotated[str, Field(pattern=_NAME)]
     role: Role
     robots: tuple[Robot, ...] | None = None
@@ -61,8 +60,7 @@ class Entry(BaseModel):
         return Principal(name=self.name, role=self.role, robots=self.own_robots, sites=self.sites)
 
 
-class _List(BaseModel):
-    model_config = _ENTRY_CONFIG
+class _List(TomlTable):
     site: Annotated[str, Field(pattern=_ROBOT)]
     border: Border = "open"
     routers: tuple[str, ...] = ()

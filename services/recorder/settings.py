@@ -3,16 +3,16 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
 from robomesh.schemas.robomesh_pb2 import Event
+from robots.schema.toml_table import TomlTable
 
 MIB = 1 << 20
 
 
-class Flight(BaseModel):
+class Flight(TomlTable):
     """The last minutes of every robot, saved after an event.
 
     Attributes:
@@ -21,7 +21,6 @@ class Flight(BaseModel):
         after_s: Time after the event that is added [s].
     """
 
-    model_config = PART_CONFIG
     minutes: Annotated[float, Field(ge=0, le=120)] = 5
     severity: Literal["warning", "error", "critical"] = "error"
     after_s: Annotated[float, Field(ge=0, le=600)] = 30
@@ -33,7 +32,7 @@ class Flight(BaseModel):
         return found
 
 
-class Split(BaseModel):
+class Split(TomlTable):
     """Limits at which a recording continues in a new file.
 
     Attributes:
@@ -41,12 +40,11 @@ class Split(BaseModel):
         minutes: Duration of a file [min].
     """
 
-    model_config = PART_CONFIG
     mib: Annotated[float, Field(ge=1, le=65536)] = 1024
     minutes: Annotated[float, Field(ge=0.1, le=1440)] = 60
 
 
-class FreeSpace(BaseModel):
+class FreeSpace(TomlTable):
     """Free space on the disk below which the recorder records less.
 
     Attributes:
@@ -55,13 +53,12 @@ class FreeSpace(BaseModel):
         states_mib: Below this it records no values that can be computed from the joints again [MiB].
     """
 
-    model_config = PART_CONFIG
     warn_mib: Annotated[float, Field(ge=0)] = 2048
     video_mib: Annotated[float, Field(ge=0)] = 512
     states_mib: Annotated[float, Field(ge=0)] = 64
 
 
-class Recorder(BaseModel):
+class Recorder(TomlTable):
     """Recordings.
 
     Attributes:
@@ -73,7 +70,6 @@ class Recorder(BaseModel):
         free: Limits of the free space.
     """
 
-    model_config = PART_CONFIG
     folder: Path = Path("recordings")
     views: tuple[str, ...] | None = None
     flight: Flight = Flight()

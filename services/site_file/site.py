@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import (
-    BaseModel,
     Field,
     ValidationError,
     field_validator,
     model_validator,
 )
 
-from protocol_gateway.seam.table import PART_CONFIG, Table
+from protocol_gateway.seam.table import Table
 from renderer.settings import ALWAYS_RENDERED, Renderer
 from robomesh.errors import ListenError
 from robomesh.listen_address import (
@@ -33,6 +32,7 @@ from robots.kinematics.kinematic_tree import BASE, bare_links, tree_of
 from robots.schema.bounded_toml import read_toml
 from robots.schema.errors import DescriptionError, VerificationRecordError
 from robots.schema.robot_toml import Pose, UrdfDescription
+from robots.schema.toml_table import TomlTable
 from services.errors import SiteFileError
 from services.recorder.settings import Recorder
 from services.site_file.tables.console import Console
@@ -49,18 +49,17 @@ from services.watch.settings import Watch
 _MAX_PROBLEMS = 100
 
 
-class Define(BaseModel):
+class Define(TomlTable):
     """Robots that are defined on the page.
 
     Attributes:
         folder: Folder of these robots.
     """
 
-    model_config = PART_CONFIG
     folder: Path = Path("robots")
 
 
-class Audit(BaseModel):
+class Audit(TomlTable):
     """The gateway's audit logs, one for each robot.
 
     Attributes:
@@ -68,7 +67,6 @@ class Audit(BaseModel):
         rotate_mib: Size at which a log file becomes an older part, and a new file begins [MiB].
     """
 
-    model_config = PART_CONFIG
     folder: Path = Path("audit")
     rotate_mib: Annotated[float, Field(ge=0.01, le=1024)] = 16
 

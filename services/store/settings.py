@@ -3,15 +3,15 @@
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract.quotas import DEFAULT_QUOTAS, Quotas
+from robots.schema.toml_table import TomlTable
 
 MIB = 1 << 20
 
 
-class Programs(BaseModel):
+class Programs(TomlTable):
     """Programs and notes that the site stores.
 
     Attributes:
@@ -21,7 +21,6 @@ class Programs(BaseModel):
         notes_mib: Quota of all notes; none is ever removed [MiB].
     """
 
-    model_config = PART_CONFIG
     folder: Path = Path("programs")
     most_mib: Annotated[float, Field(ge=1, le=4096)] = 64
     runs_mib: Annotated[float, Field(ge=1, le=4096)] = 16

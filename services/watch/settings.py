@@ -2,22 +2,19 @@
 
 from pathlib import Path
 
-from pydantic import BaseModel
-
-from protocol_gateway.seam.table import PART_CONFIG
+from robots.schema.toml_table import TomlTable
 
 # A restart is over by then: the old token is gone and the new one is present.
 SETTLED_S = 6.0
 
 
-class Watch(BaseModel):
+class Watch(TomlTable):
     """The service that raises alarms.
 
     Attributes:
         folder: Folder of its alarms, so that a restart keeps acknowledgements.
     """
 
-    model_config = PART_CONFIG
     folder: Path = Path("watch")
 
 

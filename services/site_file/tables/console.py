@@ -3,15 +3,15 @@
 import re
 from pathlib import Path
 
-from pydantic import BaseModel, StrictBool, field_validator
+from pydantic import StrictBool, field_validator
 
-from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.listen_address import split_address
+from robots.schema.toml_table import TomlTable
 
 _ORIGIN = re.compile(r"https?://(?:[a-z0-9.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?")
 
 
-class ConsoleTls(BaseModel):
+class ConsoleTls(TomlTable):
     """The page's certificate.
 
     Attributes:
@@ -19,12 +19,11 @@ class ConsoleTls(BaseModel):
         key: File of its private key (PEM).
     """
 
-    model_config = PART_CONFIG
     certificate: Path
     key: Path
 
 
-class Console(BaseModel):
+class Console(TomlTable):
     """The console: the service that serves the page.
 
     Attributes:
@@ -38,7 +37,6 @@ class Console(BaseModel):
             (`robomesh accounts tokens`): other pages' requests carry no sign-in.
     """
 
-    model_config = PART_CONFIG
     listen: str = "127.0.0.1:8080"
     hosts: tuple[str, ...] = ()
     accounts: Path | None = None

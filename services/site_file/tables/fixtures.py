@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
 
-from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract import keys
 from robomesh.errors import KeyNameError
 from robots.kinematics.joints import FloatArray
@@ -19,6 +18,7 @@ from robots.kinematics.kinematic_tree import Shape, rgb
 from robots.schema.errors import ShapeError
 from robots.schema.poses import pose_matrix
 from robots.schema.robot_toml import Pose, Positive, Units, nearest
+from robots.schema.toml_table import TomlTable
 from robots.shapes.geometry import Geometry, Material, Part
 from robots.shapes.normals import creased
 from robots.shapes.solids import ball, box, turned
@@ -29,7 +29,7 @@ _SHAPES = ("box", "cylinder", "sphere", "mesh")
 Distance = Annotated[float, Field(strict=True, ge=0, le=10_000)]
 
 
-class Clearance(BaseModel):
+class Clearance(TomlTable):
     """Distances between an arm and its surroundings.
 
     Attributes:
@@ -37,7 +37,6 @@ class Clearance(BaseModel):
         stop: Below this distance a check fails, and `check = "require"` refuses the motion [mm].
     """
 
-    model_config = PART_CONFIG
     warning: Distance = 50.0
     stop: Distance = 10.0
 
@@ -50,7 +49,7 @@ class Clearance(BaseModel):
         return self
 
 
-class Floor(BaseModel):
+class Floor(TomlTable):
     """The floor below a cell.
 
     Attributes:
@@ -59,7 +58,6 @@ class Floor(BaseModel):
         stop: Below this distance a check fails [mm].
     """
 
-    model_config = PART_CONFIG
     height: Annotated[float, Field(strict=True, ge=-100_000, le=100_000)] | None = None
     warning: Distance = 0.0
     stop: Distance = 0.0
@@ -73,7 +71,7 @@ class Floor(BaseModel):
         return self
 
 
-class Fixture(BaseModel):
+class Fixture(TomlTable):
     """A static object in a cell: exactly one shape, `box`, `cylinder`, `sphere` or `mesh`.
 
     Attributes:
@@ -90,7 +88,6 @@ class Fixture(BaseModel):
         ignore: Links that may touch it, as `"<robot>/<link>"`.
     """
 
-    model_config = PART_CONFIG
     cell: str
     name: str
     box: tuple[Positive, Positive, Positive] | None = None

@@ -2,17 +2,17 @@
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, StrictBool, field_validator, model_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
 
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
-from protocol_gateway.seam.table import PART_CONFIG
 from protocol_gateway.seam.text_limits import LONGEST_TEXT
 from robomesh.contract import keys
 from robomesh.errors import KeyNameError, ListenError
 from robomesh.listen_address import check_reach, is_loopback, split_address
+from robots.schema.toml_table import TomlTable
 
 
-class Commander(BaseModel):
+class Commander(TomlTable):
     """An address from which legacy clients may command; in place of the table, the address alone.
 
     Attributes:
@@ -20,7 +20,6 @@ class Commander(BaseModel):
         operator: The operator's name for its commands; empty: the address.
     """
 
-    model_config = PART_CONFIG
     address: str
     operator: str = ""
 
@@ -53,7 +52,7 @@ class Commander(BaseModel):
         return self.operator or self.address
 
 
-class LegacyClients(BaseModel):
+class LegacyClients(TomlTable):
     """The address on which the gateway serves legacy clients as if it were the robot's controller.
 
     Attributes:
@@ -63,7 +62,6 @@ class LegacyClients(BaseModel):
         insecure: Accept an address that other machines reach: the protocol has no TLS.
     """
 
-    model_config = PART_CONFIG
     listen: str
     commanders: tuple[Commander, ...] = ()
     most: Annotated[int, Field(ge=1, le=1000, strict=True)] = 16

@@ -2,17 +2,16 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
-from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract.quotas import DEFAULT_QUOTAS as DEFAULT
 from robomesh.contract.quotas import Quotas as QuotaSettings
+from robots.schema.toml_table import TomlTable
 
 
-class Quotas(BaseModel):
+class Quotas(TomlTable):
     """Limits for each client's name; `robomesh/contract/quotas.py` describes each."""
 
-    model_config = PART_CONFIG
     views: Annotated[int, Field(ge=1, le=256)] = DEFAULT.views
     key_frames_a_minute: Annotated[float, Field(ge=1, le=60_000)] = DEFAULT.key_frames_a_minute
     checks: Annotated[int, Field(ge=1, le=16)] = DEFAULT.checks

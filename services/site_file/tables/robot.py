@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
 
 from pydantic import (
-    BaseModel,
     Field,
     StrictBool,
     ValidationError,
@@ -22,7 +21,7 @@ from protocol_gateway.configuration.kinds import is_known, kind_of, own_kinds, p
 from protocol_gateway.seam import Recovery
 from protocol_gateway.seam.errors import CodeTableError, GatewaySettingsError
 from protocol_gateway.seam.kind import Kind
-from protocol_gateway.seam.table import PART_CONFIG, Declared, Table, problem_text
+from protocol_gateway.seam.table import Declared, Table, problem_text
 from protocol_gateway.unit_protocol.codes import code_table
 from robomesh.contract import keys
 from robomesh.contract.access_rights import PROBE_ROBOT
@@ -32,11 +31,12 @@ from robots.descriptions.description import Pose, load
 from robots.kinematics.joints import joints_of
 from robots.kinematics.verification_record import VerificationRecord, read_record
 from robots.schema.robot_toml import JointSettings, Model, Positive, Range, StatedModel
+from robots.schema.toml_table import TomlTable
 from services.site_file.tables.fixtures import Clearance, Floor
 from services.site_file.tables.legacy_clients import LegacyClients
 
 
-class StopTrial(BaseModel):
+class StopTrial(TomlTable):
     """A trial of the stop on the real controller.
 
     Attributes:
@@ -46,14 +46,13 @@ class StopTrial(BaseModel):
         date: Day of the trial.
     """
 
-    model_config = PART_CONFIG
     driver: str
     means: str
     software: str
     date: date
 
 
-class Robot(BaseModel):
+class Robot(TomlTable):
     """An arm and its controller.
 
     Attributes:
@@ -103,7 +102,6 @@ class Robot(BaseModel):
         legacy_clients: Address for programs that use the unit protocol; absent: they cannot connect.
     """
 
-    model_config = PART_CONFIG
     name: str
     model: str
     pose: Pose = Pose()

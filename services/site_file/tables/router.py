@@ -6,7 +6,6 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, StrictBool, ValidationError, field_validator
 
-from protocol_gateway.seam.table import PART_CONFIG
 from robomesh.contract.access_rights import Border
 from robomesh.contract.certificate_identity import read_identity
 from robomesh.contract.endpoints import Link, Tls
@@ -14,6 +13,7 @@ from robomesh.contract.keys import check_name
 from robomesh.errors import KeyNameError, ListenError
 from robomesh.listen_address import reachable, split_address
 from robots.schema.bounded_toml import read_toml
+from robots.schema.toml_table import TomlTable
 from services.pki import Folder
 from services.pki.errors import KeysError
 
@@ -27,7 +27,7 @@ OTHER_PARTS = frozenset(
 _SITE_LINK = re.compile(r"([a-z0-9][a-z0-9_-]*)(?:=(\S+))?")
 
 
-class TlsFiles(BaseModel):
+class TlsFiles(TomlTable):
     """Certificates of this end that `robomesh keys` did not make.
 
     Attributes:
@@ -36,13 +36,12 @@ class TlsFiles(BaseModel):
         key: File of its private key (PEM).
     """
 
-    model_config = PART_CONFIG
     ca: Path
     certificate: Path
     key: Path
 
 
-class Router(BaseModel):
+class Router(TomlTable):
     """The site's router.
 
     Attributes:
@@ -58,7 +57,6 @@ class Router(BaseModel):
         insecure: Accept an endpoint that other machines reach without TLS.
     """
 
-    model_config = PART_CONFIG
     listen: Annotated[tuple[str, ...], Field(min_length=1)] = ("tcp/127.0.0.1:7447",)
     public: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
@@ -80,7 +78,7 @@ class Router(BaseModel):
         return connect
 
 
-class Metrics(BaseModel):
+class Metrics(TomlTable):
     """The metrics of the site's services for Prometheus.
 
     Attributes:
@@ -88,7 +86,6 @@ class Metrics(BaseModel):
             order gateway, kinematics, console, recorder, player, watch, renderer, store.
     """
 
-    model_config = PART_CONFIG
     listen: str | None = None
 
     @field_validator("listen")
@@ -102,18 +99,17 @@ class Metrics(BaseModel):
         return listen
 
 
-class Keys(BaseModel):
+class Keys(TomlTable):
     """The site's own certificates, made by `robomesh keys`; with them every connection uses TLS.
 
     Attributes:
         folder: Folder of the certificates; absent: the site has none.
     """
 
-    model_config = PART_CONFIG
     folder: Path | None = None
 
 
-class RoutedSite(BaseModel):
+class RoutedSite(TomlTable):
     """The parts of a site file that its router needs.
 
     Attributes:
@@ -123,7 +119,6 @@ class RoutedSite(BaseModel):
         metrics: Metrics for Prometheus.
     """
 
-    model_config = PART_CONFIG
     site: str
     router: Router = Router()
     keys: Keys = Keys()
