@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from protocol_gateway.audit.files import lines_of, open_files
-from protocol_gateway.authority.audit_entry import Entry, Outcome, audit_entry, parse_line
+from protocol_gateway.authority.audit_entry import Entry, Outcome, entry_message, parse_line
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
 from robomesh.contract.enum_names import enum_name
@@ -150,7 +150,7 @@ class SearchServer:
 
     def _list(self, query: Query) -> schema.AuditList:
         return schema.AuditList(
-            entries=[audit_entry(entry) for entry in find(self._live, query, in_background=True)]
+            entries=[entry_message(entry) for entry in find(self._live, query, in_background=True)]
         )
 
 

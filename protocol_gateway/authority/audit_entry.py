@@ -1,4 +1,4 @@
-"""Line of an audit log: an entry in JSON, chained to the previous entry by its hash.
+"""Entry of an audit log, and its line: JSON, chained to the previous entry by its hash.
 
 `hash` is the SHA-256 of the same object without `hash`, keys sorted, no blanks:
 
@@ -19,12 +19,18 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 from protocol_gateway.seam.errors import AuditError
+from protocol_gateway.seam.text_limits import LONGEST_SENTENCE
 from robomesh.contract.messages import reason_message
 from robomesh.reasons import Reason
 from robomesh.schemas import robomesh_pb2 as schema
+from robomesh.texts import one_line
 
 GATEWAY = "gateway"
 """Operator and source of the gateway's own entries."""
+# Sources of requests over the mesh, of a program's steps and end, and of a jog's.
+MESH = "mesh"
+PROGRAM = "program"
+JOG = "jog"
 
 NO_PREVIOUS = "0" * 64
 # Most levels of reasons within reasons; the gateway writes fewer.
@@ -68,6 +74,34 @@ class Entry:
     number: int = 0
     previous: str = NO_PREVIOUS
     hash: str = ""
+
+
+def entry_of(
+    request: str,
+    *,
+    time_ns: int,
+    operator: str,
+    source: str,
+    outcome: Outcome,
+    text: str,
+    why: Reason | None = None,
+    **values: object,
+) -> Entry:
+    """Create an entry; empty values are omitted, long ones shortened."""
+    return Entry(
+        time_ns=time_ns,
+        operator=operator,
+        source=source,
+        request=request,
+        outcome=outcome,
+        text=text,
+        reason=why,
+        values={
+            name: one_line(str(value), LONGEST_SENTENCE)
+            for name, value in values.items()
+            if value not in ("", 0)
+        },
+    )
 
 
 class ChainLink(NamedTuple):
@@ -151,7 +185,7 @@ def _check(entry: Entry) -> None:
         bytes.fromhex(each)
 
 
-def audit_entry(entry: Entry) -> schema.AuditEntry:
+def entry_message(entry: Entry) -> schema.AuditEntry:
     """Convert an entry to a message of the mesh."""
     message = schema.AuditEntry(
         number=entry.number,

@@ -10,8 +10,8 @@ from protocol_gateway.authority.admission import (
     stop_refusal,
     wait_refusal,
 )
+from protocol_gateway.authority.audit_entry import MESH
 from protocol_gateway.authority.decisions import PlannedProgram, Snapshot
-from protocol_gateway.authority.entries import MESH
 from protocol_gateway.authority.events import CommandsRequested
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, Now, holds, not_sent
 from protocol_gateway.authority.preconditions import ControllerState, obstacle, predicted

@@ -25,8 +25,8 @@ from dataclasses import replace
 from typing import Any, assert_never
 
 from protocol_gateway.authority import (
+    audited_events,
     decisions,
-    entries,
     evaluation,
     events,
     lease_rules,
@@ -35,7 +35,8 @@ from protocol_gateway.authority import (
     stop_rules,
 )
 from protocol_gateway.authority.admission import Verdict, keep_answer
-from protocol_gateway.authority.audit_entry import GATEWAY, Outcome
+from protocol_gateway.authority.audit_entry import GATEWAY, JOG, Outcome
+from protocol_gateway.authority.audited_events import command_entries, lease_entry
 from protocol_gateway.authority.decisions import CheckResult, Decisions, Snapshot
 from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.events import LeaseResult, StopResult
@@ -120,12 +121,12 @@ class RobotAuthority:
             case events.JogEnded():
                 self._program = None
                 yield published_events.jog_ended(event)
-                yield decisions.AppendLater(entries.jog_end_entry(event, seen.now))
+                yield decisions.AppendLater(audited_events.jog_end_entry(event, seen.now))
                 yield decisions.PublishState()
             case events.ProgramEnded():
                 self._program = None
                 yield published_events.program_ended(event)
-                yield decisions.AppendLater(entries.program_end_entry(event, seen.now))
+                yield decisions.AppendLater(audited_events.program_end_entry(event, seen.now))
                 yield decisions.PublishState()
             case events.TimePassed():
                 yield from self._expire(seen)
@@ -208,7 +209,7 @@ class RobotAuthority:
             yield decisions.CancelPrograms(codes.PROGRAM_STOPPED(by=stop.by, reason=stop.reason))
             yield decisions.PublishState()
             yield published_events.stop_latched(stop, result)
-        yield decisions.AppendLater(entries.stop_entry(stop, result, seen.now))
+        yield decisions.AppendLater(audited_events.stop_entry(stop, result, seen.now))
         return result
 
     def _repeated(self, stop: events.StopRequested, seen: Snapshot) -> StopResult | None:
@@ -231,7 +232,7 @@ class RobotAuthority:
         yield decisions.PublishState()
         result = StopResult(codes.STOP_SENT_AGAIN(id=latched.id), latched.id, sent=True)
         yield published_events.stop_sent(result)
-        yield decisions.AppendLater(entries.repeated_stop_entry(result, seen.now))
+        yield decisions.AppendLater(audited_events.repeated_stop_entry(result, seen.now))
 
     def _check_heeded(self, moving: bool, seen: Snapshot) -> Decisions[None]:
         """Report a robot that still moves after its stop, and send the stop again."""
@@ -245,7 +246,7 @@ class RobotAuthority:
         why = codes.STOP_DISOBEYED(problem or codes.STOP_UNIT_REPEATED(), id=latched.id)
         result = StopResult(why, latched.id, sent=problem is None)
         yield published_events.stop_disobeyed(result)
-        yield decisions.AppendLater(entries.repeated_stop_entry(result, seen.now))
+        yield decisions.AppendLater(audited_events.repeated_stop_entry(result, seen.now))
 
     def _send_stop_unit(self) -> Decisions[Reason | None]:
         """Send the stop unit; return the reason of a failure."""
@@ -263,7 +264,7 @@ class RobotAuthority:
         unrecorded = event.request.action == _A.RENEW or (event.request.action == _A.ASK and asked_before)
         outcome = yield from self._evaluate_lease(event, seen)
         if outcome.answer.accepted and not unrecorded:
-            entry = entries.lease_entry(event, Outcome.ACCEPTED, outcome.answer, seen.now)
+            entry = lease_entry(event, Outcome.ACCEPTED, outcome.answer, seen.now)
             if event.is_immediate:
                 yield decisions.AppendLater(entry)
             else:
@@ -272,7 +273,7 @@ class RobotAuthority:
                     return LeaseResult(refused(codes.LEASE_NOT_WRITTEN(problem)))
                 outcome = yield from self._evaluate_lease(event, seen)
         if not outcome.answer.accepted:
-            yield decisions.AppendLater(entries.lease_entry(event, Outcome.REFUSED, outcome.answer, seen.now))
+            yield decisions.AppendLater(lease_entry(event, Outcome.REFUSED, outcome.answer, seen.now))
             return LeaseResult(outcome.answer)
         yield from self._set_authority(outcome.authority, outcome.ended, seen)
         return LeaseResult(outcome.answer, outcome.granted)
@@ -302,7 +303,7 @@ class RobotAuthority:
         if authority is not self._authority:
             yield from self._set_authority(authority, ended, seen)
         if ended is not None:
-            yield decisions.AppendLater(entries.lease_end_entry(request, ended, seen.now))
+            yield decisions.AppendLater(audited_events.lease_end_entry(request, ended, seen.now))
 
     def _set_authority(self, authority: Authority, ended: LeaseEnd | None, seen: Snapshot) -> Decisions[None]:
         """Set the state; stop the motion of a lease that has ended, before anything else."""
@@ -369,7 +370,7 @@ class RobotAuthority:
         if any(request.command == _C.RESET for request in command.requests):
             self._last_stop = None  # a stop from now on is a new one, and the RESET does not clear it
         accepted = Answer(True, "" if warning is None else warning.text, warning)
-        unwritten, seen = yield decisions.Append(entries.command_entries(command, Outcome.ACCEPTED, accepted))
+        unwritten, seen = yield decisions.Append(command_entries(command, Outcome.ACCEPTED, accepted))
         if unwritten is not None:
             return not_sent(codes.COMMAND_NOT_WRITTEN(unwritten))
         yield from self._expire(seen)
@@ -422,7 +423,7 @@ class RobotAuthority:
                 yield decisions.KeepLatch(self._authority.stop, self._authority.last_stop_id)
                 yield published_events.stop_reset(latched.id)
             if request.command == _C.RECOVER:
-                recovery = entries.recovery_name(request)
+                recovery = audited_events.recovery_name(request)
                 yield published_events.recovery_sent(recovery, command.operator, request.recover.reason)
                 return f"{recovery} is on the controller's socket; the robot's state shows what becomes of it"
             yield decisions.PublishState()
@@ -448,7 +449,7 @@ class RobotAuthority:
         if not lease_rules.holds(self._authority, part.operator, part.secret):
             return codes.COMMAND_CONTROL_ENDED()
         command = events.CommandsRequested(
-            requests=requests, operator=part.operator, source=entries.JOG, arrived=seen.now, step=True
+            requests=requests, operator=part.operator, source=JOG, arrived=seen.now, step=True
         )
         refusal = evaluation.refusal_of(command, self._authority, program, seen, self._joints)
         if refusal is not None:
@@ -573,5 +574,5 @@ def _confirms(command: events.CommandsRequested) -> bool:
 
 
 def _record(command: events.CommandsRequested, outcome: Outcome, answer: Answer) -> Decisions[None]:
-    for entry in entries.command_entries(command, outcome, answer):
+    for entry in command_entries(command, outcome, answer):
         yield decisions.AppendLater(entry)

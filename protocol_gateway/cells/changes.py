@@ -22,8 +22,7 @@ import time
 from collections.abc import AsyncIterator, Collection, Mapping
 from dataclasses import dataclass
 
-from protocol_gateway.authority.audit_entry import Entry, Outcome
-from protocol_gateway.authority.entries import MESH, entry_of
+from protocol_gateway.authority.audit_entry import MESH, Entry, Outcome, entry_of
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.checker import Checker
 from protocol_gateway.configuration.settings import CellFile

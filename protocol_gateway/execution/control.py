@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from protocol_gateway.audit.latch_file import LatchFile
-from protocol_gateway.authority import decisions, entries, events
+from protocol_gateway.authority import audited_events, decisions, events
 from protocol_gateway.authority.admission import Verdict, admit_all, wait_refusal
+from protocol_gateway.authority.audit_entry import PROGRAM
 from protocol_gateway.authority.decisions import CheckResult, PlannedProgram, Snapshot
-from protocol_gateway.authority.entries import PROGRAM, page_values
 from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.lease_rules import Answer, Authority
 from protocol_gateway.authority.preconditions import ControllerState
@@ -101,7 +101,7 @@ class Control:
         self, *, by: str, reason: str, source: str, page: schema.PageReport | None = None
     ) -> schema.StopAnswer:
         """Stop the robot; allowed for every sender at any time."""
-        shown = {} if page is None else page_values(page)
+        shown = {} if page is None else audited_events.page_values(page)
         event = events.StopRequested(by=by, reason=reason, source=source, page=shown)
         result: events.StopResult = self.handle(event)
         return stop_answer(result)
@@ -118,7 +118,7 @@ class Control:
         """Audit stops that were answered from memory, as one entry with the newest one's sender."""
         result = events.StopResult(codes.STOP_SENT(id=stop_id), stop_id, sent=True)
         event = events.StopRequested(by=by, reason=reason, source=source)
-        entry = entries.stop_entry(event, result, read_clocks())
+        entry = audited_events.stop_entry(event, result, read_clocks())
         self._performers.audit_trail.write_later(replace(entry, repeated=count - 1))
 
     async def lease(self, request: schema.LeaseRequest, *, operator: str, source: str) -> schema.LeaseAnswer:

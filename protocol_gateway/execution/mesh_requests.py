@@ -7,8 +7,7 @@ from functools import partial
 
 from google.protobuf.message import Message
 
-from protocol_gateway.authority.audit_entry import Entry, Outcome
-from protocol_gateway.authority.entries import MESH, entry_of
+from protocol_gateway.authority.audit_entry import MESH, Entry, Outcome, entry_of
 from protocol_gateway.execution.clocks import read_clocks
 from protocol_gateway.execution.control import Control
 from protocol_gateway.execution.deadlines import set_deadline

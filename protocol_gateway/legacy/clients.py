@@ -14,8 +14,7 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping
 
-from protocol_gateway.authority.audit_entry import Entry, Outcome
-from protocol_gateway.authority.entries import entry_of
+from protocol_gateway.authority.audit_entry import Entry, Outcome, entry_of
 from protocol_gateway.execution.control import Control
 from protocol_gateway.legacy.commander import Commander
 from protocol_gateway.legacy.requests import (

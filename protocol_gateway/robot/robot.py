@@ -12,7 +12,7 @@ from protocol_gateway.audit.log import AuditLog, Entry
 from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
 from protocol_gateway.authority import events
-from protocol_gateway.authority.audit_entry import audit_entry
+from protocol_gateway.authority.audit_entry import entry_message
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import HEED_TIMEOUT_S
 from protocol_gateway.configuration.settings import RobotSettings
@@ -228,7 +228,7 @@ class Robot:
             self._journal.report(_S.WARNING, "stop.remembered", text, stop_id=stop.id)
         for entry in find(self._audit.path, Query(most=LIST_LENGTH)):
             with contextlib.suppress(ValueError, TypeError):  # a changed line: `verify` reports it
-                self._audit_topic.remember(audit_entry(entry), source_time_ns=entry.time_ns)
+                self._audit_topic.remember(entry_message(entry), source_time_ns=entry.time_ns)
         self._publish_state()
 
     def _report_read_only(self) -> None:
@@ -453,7 +453,7 @@ class Robot:
         self._control.handle(events.UnitRefused())
 
     def _on_written(self, entry: Entry) -> None:
-        self._audit_topic.put(audit_entry(entry), source_time_ns=entry.time_ns)
+        self._audit_topic.put(entry_message(entry), source_time_ns=entry.time_ns)
         if entry.request == ROTATE:
             name = self._audit.path.name
             self._journal.report(_S.INFO, "audit.rotated", f"audit log {name}: {entry.text}", file=name)

@@ -15,7 +15,7 @@ from protocol_gateway.audit.files import older_parts, read_entries, verify
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
 from protocol_gateway.audit.persisted_state import UNKNOWN
 from protocol_gateway.audit.search import Query, find
-from protocol_gateway.authority.audit_entry import audit_entry, chain_link, parse_line
+from protocol_gateway.authority.audit_entry import chain_link, entry_message, parse_line
 from protocol_gateway.seam.errors import AuditError
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
@@ -241,7 +241,7 @@ def test_any_line_is_an_entry_or_an_audit_error(tmp_path_factory, numbers, value
     line = line.replace(b'"values":{}', b'"values":%s' % json.dumps(values).encode())
     live.write_bytes(line)
     with contextlib.suppress(AuditError):
-        audit_entry(parse_line(line))
+        entry_message(parse_line(line))
     chain_link(line)
     find(live, Query(since_ns=0))
     assert not verify(live).ok or verify(live).entries == 1

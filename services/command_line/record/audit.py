@@ -192,13 +192,13 @@ def _checked_most(most: int) -> int:
 
 def _of_file(file: Path, query: schema.AuditQuery) -> list[_Row]:
     from protocol_gateway.audit import search
-    from protocol_gateway.authority.audit_entry import audit_entry
+    from protocol_gateway.authority.audit_entry import entry_message
 
     try:
         found = search.find(file, search.query_of(query))
     except OSError as error:
         raise AuditFileError(f"{file}: cannot be read: {error.strerror}") from None
-    return [_Row(file.stem, audit_entry(entry)) for entry in found]
+    return [_Row(file.stem, entry_message(entry)) for entry in found]
 
 
 async def _of_mesh(text: str, router: str, query: schema.AuditQuery) -> list[_Row]:

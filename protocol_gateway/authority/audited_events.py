@@ -1,11 +1,11 @@
-"""Audit entries of requests. No I/O; time is an argument."""
+"""Audit entries of the events that a robot's authority handles. Pure functions."""
 
 import contextlib
 import math
 from collections.abc import Mapping
 from hashlib import sha256
 
-from protocol_gateway.authority.audit_entry import GATEWAY, Entry, Outcome
+from protocol_gateway.authority.audit_entry import GATEWAY, JOG, PROGRAM, Entry, Outcome, entry_of
 from protocol_gateway.authority.events import (
     CommandsRequested,
     JogEnded,
@@ -15,46 +15,11 @@ from protocol_gateway.authority.events import (
     StopResult,
 )
 from protocol_gateway.authority.lease_rules import Answer, LeaseEnd, Now
-from protocol_gateway.seam.text_limits import LONGEST_SENTENCE, LONGEST_TEXT
+from protocol_gateway.seam.text_limits import LONGEST_TEXT
 from robomesh.contract.enum_names import enum_name
 from robomesh.reasons import Reason
 from robomesh.schemas.robomesh_pb2 import CommandRequest, Jog, LeaseRequest, PageReport, Recover
 from robomesh.texts import one_line
-
-# Source of requests over the mesh.
-MESH = "mesh"
-# Source of a program's steps.
-PROGRAM = "program"
-# Source of the end of a jog.
-JOG = "jog"
-
-
-def entry_of(
-    request: str,
-    *,
-    time_ns: int,
-    operator: str,
-    source: str,
-    outcome: Outcome,
-    text: str,
-    why: Reason | None = None,
-    **values: object,
-) -> Entry:
-    """Create an entry; empty values are omitted, long ones shortened."""
-    return Entry(
-        time_ns=time_ns,
-        operator=operator,
-        source=source,
-        request=request,
-        outcome=outcome,
-        text=text,
-        reason=why,
-        values={
-            name: one_line(str(value), LONGEST_SENTENCE)
-            for name, value in values.items()
-            if value not in ("", 0)
-        },
-    )
 
 
 def lease_entry(event: LeaseRequested, outcome: Outcome, answer: Answer, now: Now) -> Entry:
