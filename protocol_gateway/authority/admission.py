@@ -44,7 +44,7 @@ _LONGEST_DEADLINES_S = {_C.RUN_PROGRAM: 65.0, _C.HOLD: math.inf}
 LONGEST_WAIT_S = 1.0
 
 
-class Verdict(NamedTuple):
+class Admission(NamedTuple):
     """Result of the admission; `repeat`: the command was answered before, and is not executed again."""
 
     answer: Answer
@@ -52,32 +52,32 @@ class Verdict(NamedTuple):
     id_used: bool = False  # the id is used by the holder, so the answer is kept for a repeat
 
 
-def admit(authority: Authority, request: CommandRequest, *, operator: str, now: Now) -> Verdict:
+def admit(authority: Authority, request: CommandRequest, *, operator: str, now: Now) -> Admission:
     """Evaluate whether a command is the holder's, in time and new, and no stop forbids it."""
     if not holds(authority, operator, request.lease) or authority.lease is None:
-        return Verdict(not_sent(why_not_holder(authority, operator)))
+        return Admission(not_sent(why_not_holder(authority, operator)))
     lease = authority.lease
     if request.id == lease.last_id and lease.last_answer is not None and lease.last_content is not None:
         if content_of(request) == lease.last_content:
-            return Verdict(lease.last_answer, repeat=True)
+            return Admission(lease.last_answer, repeat=True)
         used = codes.COMMAND_ID_USED(id=request.id, what=lease.last_content.description())
-        return Verdict(not_sent(used))
+        return Admission(not_sent(used))
     if request.id <= lease.last_id:
-        return Verdict(not_sent(codes.COMMAND_ID_OLD(id=request.id, last=lease.last_id)))
+        return Admission(not_sent(codes.COMMAND_ID_OLD(id=request.id, last=lease.last_id)))
     refusal = deadline_refusal(request, now) or stop_refusal(authority, request)
-    return Verdict(refusal or Answer(True, ""), id_used=True)
+    return Admission(refusal or Answer(True, ""), id_used=True)
 
 
 def admit_all(
     authority: Authority, requests: Sequence[CommandRequest], *, operator: str, now: Now
-) -> Verdict:
+) -> Admission:
     """Evaluate commands of one unit, each after the previous ones; return the first refusal or repeat."""
     for request in requests:
-        verdict = admit(authority, request, operator=operator, now=now)
-        if verdict.repeat or not verdict.answer.accepted:
+        admission = admit(authority, request, operator=operator, now=now)
+        if admission.repeat or not admission.answer.accepted:
             break
         authority = after_command(authority, request)
-    return verdict
+    return admission
 
 
 def content_of(request: CommandRequest) -> Content:

@@ -4,7 +4,7 @@
     ------------------------------------  ---------------------------------------------------
     Send                                  reason of a failure, or None
     Recheck                               reason for a change, or None
-    EnterCell, CheckMotion, Append        awaited: Snapshot; CheckResult; (reason or None, Snapshot)
+    EnterCell, CheckMotion, Append        awaited: Snapshot; CheckVerdict; (reason or None, Snapshot)
     NumberStop                            number of the stop; None: the next one
     CancelPrograms                        whether a program was cancelled
     AppendLater, KeepLatch,               none
@@ -43,8 +43,8 @@ class Snapshot:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckResult:
-    """Result of the check of commands.
+class CheckVerdict:
+    """Refusal or permission of commands by their check, with its conditions.
 
     Attributes:
         refusal: Refusal of the commands; None: they may be sent.
@@ -177,7 +177,7 @@ class CheckMotion:
 class Recheck:
     """Return the reason if the robot or its cell has changed since a check; None: unchanged."""
 
-    check_result: CheckResult
+    check_verdict: CheckVerdict
 
 
 @dataclass(frozen=True)

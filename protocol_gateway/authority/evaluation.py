@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority.admission import (
-    Verdict,
+    Admission,
     admit_all,
     after_command,
     deadline_refusal,
@@ -60,12 +60,12 @@ class RunningProgram:
         return self
 
 
-def admission(command: CommandsRequested, authority: Authority, now: Now) -> Verdict:
+def admit_commands(command: CommandsRequested, authority: Authority, now: Now) -> Admission:
     """Evaluate whether commands are the holder's, in time and new, and no stop forbids them."""
     if not command.step:
         return admit_all(authority, command.requests, operator=command.operator, now=now)
     held = holds(authority, command.operator, command.requests[0].lease)
-    return Verdict(Answer(True, "") if held else not_sent(codes.COMMAND_CONTROL_ENDED()))
+    return Admission(Answer(True, "") if held else not_sent(codes.COMMAND_CONTROL_ENDED()))
 
 
 def refusal_of(

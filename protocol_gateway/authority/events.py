@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import degrees
 from typing import NamedTuple, TypeAlias
 
-from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
+from protocol_gateway.authority.decisions import CheckVerdict, PlannedProgram
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Lease, Now
 from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
@@ -119,7 +119,7 @@ class JogPartReady:
     secret: str
     target: tuple[float, ...]
     percent: float
-    check_result: CheckResult
+    check_verdict: CheckVerdict
 
 
 @dataclass(frozen=True)

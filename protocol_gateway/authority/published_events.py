@@ -1,6 +1,6 @@
 """Events that a robot's authority publishes. Pure functions."""
 
-from protocol_gateway.authority.decisions import CheckResult, PublishEvent
+from protocol_gateway.authority.decisions import CheckVerdict, PublishEvent
 from protocol_gateway.authority.events import JogEnded, ProgramEnded, StopRequested, StopResult
 from protocol_gateway.authority.lease_rules import LeaseEnd
 from robomesh import reason_codes as codes
@@ -83,11 +83,11 @@ def uncommanded_motion(leased: bool) -> PublishEvent:
     )
 
 
-def check_warning(names: str, check_result: CheckResult) -> PublishEvent:
+def check_warning(names: str, check_verdict: CheckVerdict) -> PublishEvent:
     """Report the warning of a check: of commands, or of a program."""
-    text = f"{names}: {check_result.warning}"
+    text = f"{names}: {check_verdict.warning}"
     return PublishEvent(
-        _S.WARNING, check_result.code, text, why=check_result.warning, values={"command": names}
+        _S.WARNING, check_verdict.code, text, why=check_verdict.warning, values={"command": names}
     )
 
 

@@ -34,10 +34,10 @@ from protocol_gateway.authority import (
     published_events,
     stop_rules,
 )
-from protocol_gateway.authority.admission import Verdict, keep_answer
+from protocol_gateway.authority.admission import Admission, keep_answer
 from protocol_gateway.authority.audit_entry import GATEWAY, JOG, Outcome
 from protocol_gateway.authority.audited_events import command_entries, lease_entry
-from protocol_gateway.authority.decisions import CheckResult, Decisions, Snapshot
+from protocol_gateway.authority.decisions import CheckVerdict, Decisions, Snapshot
 from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.events import LeaseResult, StopResult
 from protocol_gateway.authority.lease_rules import Answer, Authority, LeaseEnd, Now, not_sent, refused
@@ -326,11 +326,11 @@ class RobotAuthority:
 
     def _commands_requested(self, command: events.CommandsRequested, seen: Snapshot) -> Decisions[Answer]:
         yield from self._expire(seen)
-        verdict = evaluation.admission(command, self._authority, seen.now)
-        if verdict.repeat:
-            return verdict.answer
-        problem = command.refused or (None if verdict.answer.accepted else verdict.answer)
-        if verdict.answer.accepted and not command.step:
+        admission = evaluation.admit_commands(command, self._authority, seen.now)
+        if admission.repeat:
+            return admission.answer
+        problem = command.refused or (None if admission.answer.accepted else admission.answer)
+        if admission.answer.accepted and not command.step:
             yield from self._end_jog(codes.JOG_COMMANDED(names=command.names), seen)
         sends = command.program is None and not _confirms(command)
         if problem is None and command.is_immediate:
@@ -341,9 +341,9 @@ class RobotAuthority:
         if problem is None:
             seen = yield decisions.EnterCell(command.requests)
             problem = evaluation.refusal_of(command, self._authority, self._program, seen, self._joints)
-        unit, check_result = (
+        unit, check_verdict = (
             None,
-            CheckResult(start=None if command.program is None else command.program.start),
+            CheckVerdict(start=None if command.program is None else command.program.start),
         )
         if problem is None and sends:
             try:
@@ -351,22 +351,22 @@ class RobotAuthority:
             except CommandError as error:
                 problem = not_sent(error.reason)
         if problem is None and command.program is None:
-            check_result = yield decisions.CheckMotion(command.requests)
-            problem = check_result.refusal
+            check_verdict = yield decisions.CheckMotion(command.requests)
+            problem = check_verdict.refusal
         if problem is None:
             # The id is used before anything is sent, so that a repeat never executes the command again.
-            self._keep_answer(command, not_sent(codes.COMMAND_BROKEN_OFF()), verdict)
-            answer: Answer = yield from self._write_and_send(command, unit, check_result)
+            self._keep_answer(command, not_sent(codes.COMMAND_BROKEN_OFF()), admission)
+            answer: Answer = yield from self._write_and_send(command, unit, check_verdict)
         else:
             answer = problem
             yield from _record(command, Outcome.REFUSED, answer)
-        self._keep_answer(command, answer, verdict)
+        self._keep_answer(command, answer, admission)
         return answer
 
     def _write_and_send(
-        self, command: events.CommandsRequested, unit: object, check_result: CheckResult
+        self, command: events.CommandsRequested, unit: object, check_verdict: CheckVerdict
     ) -> Decisions[Answer]:
-        warning = check_result.warning
+        warning = check_verdict.warning
         if any(request.command == _C.RESET for request in command.requests):
             self._last_stop = None  # a stop from now on is a new one, and the RESET does not clear it
         accepted = Answer(True, "" if warning is None else warning.text, warning)
@@ -375,7 +375,7 @@ class RobotAuthority:
             return not_sent(codes.COMMAND_NOT_WRITTEN(unwritten))
         yield from self._expire(seen)
         problem = evaluation.refusal_meanwhile(command, self._authority, self._program, seen, self._joints)
-        if problem is None and (changed := (yield decisions.Recheck(check_result))) is not None:
+        if problem is None and (changed := (yield decisions.Recheck(check_verdict))) is not None:
             runs = command.program is not None and not command.program.is_jog
             problem = not_sent(codes.PROGRAM_MOVED() if runs else codes.COMMAND_CHANGED(changed))
         if problem is None and unit is not None:
@@ -387,8 +387,8 @@ class RobotAuthority:
         text = yield from self._book(command, unit, seen)
         if warning is None:
             return Answer(True, text)
-        if check_result.is_violation or not command.step:
-            yield published_events.check_warning(command.names, check_result)
+        if check_verdict.is_violation or not command.step:
+            yield published_events.check_warning(command.names, check_verdict)
         return Answer(True, f"{text}; mind: {warning}", warning)
 
     def _book(self, command: events.CommandsRequested, unit: object, seen: Snapshot) -> Decisions[str]:
@@ -454,7 +454,7 @@ class RobotAuthority:
         refusal = evaluation.refusal_of(command, self._authority, program, seen, self._joints)
         if refusal is not None:
             return refusal.reason
-        if (changed := (yield decisions.Recheck(part.check_result))) is not None:
+        if (changed := (yield decisions.Recheck(part.check_verdict))) is not None:
             return codes.COMMAND_CHANGED(changed)
         return (yield from self._send_for_jog(requests, seen))
 
@@ -507,8 +507,8 @@ class RobotAuthority:
             )
         return None
 
-    def _keep_answer(self, command: events.CommandsRequested, answer: Answer, verdict: Verdict) -> None:
-        if verdict.id_used:
+    def _keep_answer(self, command: events.CommandsRequested, answer: Answer, admission: Admission) -> None:
+        if admission.id_used:
             self._authority = keep_answer(self._authority, command.requests[-1], answer)
 
     # ------------------------------------------------------------- controller

@@ -25,7 +25,7 @@ from robots.checks.jog import next_part
 from robots.collision import Cell, build_cell, missing_shapes, pending, unshaped, unshaped_moving
 from robots.kinematics.inverse import InverseSolver, build_solver
 from robots.kinematics.joints import FloatArray, doubtful_limits
-from robots.programs.steps import CheckResult, Step, StepKind, Violation, ViolationKind
+from robots.programs.steps import CheckReport, Step, StepKind, Violation, ViolationKind
 
 # A program with these violations is not planned to its end, so it must not run.
 _UNREADABLE = (ViolationKind.PROGRAM, ViolationKind.UNREACHABLE)
@@ -133,7 +133,7 @@ def _paths(others: Mapping[str, tuple[Positions, ...]]) -> dict[str, FloatArray]
     return {name: np.array(path) for name, path in others.items()}
 
 
-def _checked(cell: Cell, robot: str, result: CheckResult) -> Checked:
+def _checked(cell: Cell, robot: str, result: CheckReport) -> Checked:
     uncovered, warnings = _coverage(cell, robot)
     return Checked(
         refusals=tuple(_reason(each) for each in result.violations if each.refuses),

@@ -16,9 +16,9 @@ from typing import Any
 
 from protocol_gateway.audit.latch_file import LatchFile
 from protocol_gateway.authority import audited_events, decisions, events
-from protocol_gateway.authority.admission import Verdict, admit_all, wait_refusal
+from protocol_gateway.authority.admission import Admission, admit_all, wait_refusal
 from protocol_gateway.authority.audit_entry import PROGRAM
-from protocol_gateway.authority.decisions import CheckResult, PlannedProgram, Snapshot
+from protocol_gateway.authority.decisions import CheckVerdict, PlannedProgram, Snapshot
 from protocol_gateway.authority.evaluation import RunningProgram
 from protocol_gateway.authority.lease_rules import Answer, Authority
 from protocol_gateway.authority.preconditions import ControllerState
@@ -186,12 +186,12 @@ class Control:
         answer: Answer = await self._handle_in_turn(event)
         return answer
 
-    def admit(self, request: schema.CommandRequest, operator: str) -> Verdict:
+    def admit(self, request: schema.CommandRequest, operator: str) -> Admission:
         """Evaluate whether a command is the holder's, in time and new, and no stop forbids it."""
         self.handle(events.TimePassed())
         now = read_clocks()
         if (late := wait_refusal(self.arrivals.arrived_s(now.monotonic_s), now)) is not None:
-            return Verdict(late)
+            return Admission(late)
         return admit_all(self.authority, (request,), operator=operator, now=now)
 
     @contextlib.contextmanager
@@ -246,7 +246,7 @@ class Control:
                         result = self._snapshot()
                     case decisions.CheckMotion():
                         if self._checks is None:
-                            result = CheckResult()
+                            result = CheckVerdict()
                         else:
                             result = await self._checks.check(decision.requests)
                     case decisions.Append():
@@ -264,7 +264,7 @@ class Control:
             case decisions.Send():
                 return self._send(decision)
             case decisions.Recheck():
-                return None if self._checks is None else self._checks.changed(decision.check_result)
+                return None if self._checks is None else self._checks.changed(decision.check_verdict)
             case decisions.EnterCell() | decisions.CheckMotion() | decisions.Append():
                 raise TypeError(f"{type(decision).__name__} cannot be performed without waiting")
         try:

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from protocol_gateway.authority import lease_rules
-from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
+from protocol_gateway.authority.decisions import CheckVerdict, PlannedProgram
 from protocol_gateway.authority.events import JogEnded, JogEnding, JogHeld, JogPartReady, StopRequested
 from protocol_gateway.authority.lease_rules import not_sent, why_not_holder
 from protocol_gateway.authority.preconditions import ControllerState
@@ -87,7 +87,7 @@ class _Run:
     rotary: bool
     begin_s: float
     deadline_s: float
-    first: tuple[Extended, CheckResult] | None
+    first: tuple[Extended, CheckVerdict] | None
     keep_alives: int = 0
     sequence: int = 0
     last: Positions | None = None
@@ -146,10 +146,10 @@ class JogRunner:
         Raises:
             RefusedError: If it is refused, with the reason; the robot has not moved.
         """
-        verdict = self._control.admit(request, operator)
+        admission = self._control.admit(request, operator)
         refused, run, start = None, None, None
-        if verdict.repeat or not verdict.answer.accepted:
-            refused = None if verdict.answer.accepted else verdict.answer
+        if admission.repeat or not admission.answer.accepted:
+            refused = None if admission.answer.accepted else admission.answer
         elif self._preparing is not None or self._run is not None:
             refused = not_sent(codes.JOG_RUNS())
         elif (problem := self._control.obstacle(request)) is not None:
@@ -243,7 +243,7 @@ class JogRunner:
                 await asyncio.wait((part, cancelled), return_when=asyncio.FIRST_COMPLETED)
                 if cancelled.done():
                     raise CheckError(cancelled.result())
-                start, extended, check_result = part.result()
+                start, extended, check_verdict = part.result()
             finally:
                 self._preparing = None
                 part.cancel()
@@ -263,7 +263,7 @@ class JogRunner:
             rotary=jog.turns(self._joints),
             begin_s=0.0,
             deadline_s=0.0,
-            first=(extended, check_result),
+            first=(extended, check_verdict),
         )
 
     def _direction(self, request: schema.CommandRequest) -> Jog:
@@ -384,7 +384,7 @@ class JogRunner:
         requests = (schema.CommandRequest(command=_C.JOG),)
         async with self._checks.motion_lock(requests):
             try:
-                extended, check_result = await self._part(run)
+                extended, check_verdict = await self._part(run)
             except CheckError as error:
                 self._end(run, error.reason)
                 return
@@ -398,39 +398,39 @@ class JogRunner:
                 secret=run.secret,
                 target=extended.target,
                 percent=extended.percent,
-                check_result=check_result,
+                check_verdict=check_verdict,
             )
             problem: Reason | None = self._control.handle(part)
         if problem is not None:
             self._end(run, self._why_not(run) or problem)
             return
         run.last, run.commanded = extended.target, extended.commanded
-        self._warn(run, check_result)
+        self._warn(run, check_verdict)
 
-    async def _part(self, run: _Run) -> tuple[Extended, CheckResult]:
+    async def _part(self, run: _Run) -> tuple[Extended, CheckVerdict]:
         """Return the next part; the first one was checked before the start, and must still hold."""
         if run.first is not None:
-            (extended, check_result), run.first = run.first, None
-            return extended, replace(check_result, start=run.origin)
-        _, extended, check_result = await self._checks.jog_part(
+            (extended, check_verdict), run.first = run.first, None
+            return extended, replace(check_verdict, start=run.origin)
+        _, extended, check_verdict = await self._checks.jog_part(
             run.jog, origin=run.origin, last=run.last, commanded=run.commanded
         )
-        return extended, check_result
+        return extended, check_verdict
 
     def _follow(self, run: _Run, extended: Extended) -> None:
         if abs(extended.moved - run.moved) > 1e-4 or extended.target is not None:
             run.progress_s = time.monotonic()
         run.moved = extended.moved
 
-    def _warn(self, run: _Run, check_result: CheckResult) -> None:
-        if check_result.warning is None or run.warned:
+    def _warn(self, run: _Run, check_verdict: CheckVerdict) -> None:
+        if check_verdict.warning is None or run.warned:
             return
         run.warned = True
         self._journal.report(
             schema.Event.Severity.WARNING,
-            check_result.code,
-            f"jog {run.name}: {check_result.warning}",
-            why=check_result.warning,
+            check_verdict.code,
+            f"jog {run.name}: {check_verdict.warning}",
+            why=check_verdict.warning,
         )
 
     def _rests_at_last(self, run: _Run) -> bool:

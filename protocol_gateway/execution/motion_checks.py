@@ -16,7 +16,7 @@ from contextlib import AbstractAsyncContextManager
 from dataclasses import replace
 
 from protocol_gateway.authority.admission import LONGEST_WAIT_S, time_left_s
-from protocol_gateway.authority.decisions import CheckResult
+from protocol_gateway.authority.decisions import CheckVerdict
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, not_sent, refused
 from protocol_gateway.authority.preconditions import ControllerState, predicted, target_of
 from protocol_gateway.authority.robot_authority import RobotAuthority
@@ -101,11 +101,11 @@ class MotionChecks:
         meets = self.policy is not Policy.OFF or len(self._cell) > 1
         return self._cell_occupancy.motion_lock if moves and meets else contextlib.nullcontext()
 
-    async def check(self, requests: Sequence[CommandRequest]) -> CheckResult:
+    async def check(self, requests: Sequence[CommandRequest]) -> CheckVerdict:
         """Check commands that would be sent now."""
         moves = any(each.command in MOTION_COMMANDS and each.command != _C.RUN_PROGRAM for each in requests)
         if self.policy is Policy.OFF or not moves:
-            return CheckResult()
+            return CheckVerdict()
         try:
             start = self._start(must_rest=self.policy is Policy.REQUIRE)
             others, left_out = self._others()
@@ -117,7 +117,7 @@ class MotionChecks:
             return self._not_checked(error.reason)
         return self._evaluate(checked, left_out, start, others)
 
-    async def program(self, text: str) -> tuple[Checked, CheckResult]:
+    async def program(self, text: str) -> tuple[Checked, CheckVerdict]:
         """Plan and check a program from the robot's present positions.
 
         Raises:
@@ -130,10 +130,10 @@ class MotionChecks:
             CheckProgram(robot=self._name, text=text, start=start, others=others)
         )
         if not checked.readable:
-            return checked, CheckResult(refusal=_refused("Not run", checked.refusals))
+            return checked, CheckVerdict(refusal=_refused("Not run", checked.refusals))
         # Each step is checked again before it is sent, against the other robots' state at that time.
-        check_result = self._evaluate(checked, left_out, start, others, program=True)
-        return checked, replace(check_result, start=start, others=None)
+        check_verdict = self._evaluate(checked, left_out, start, others, program=True)
+        return checked, replace(check_verdict, start=start, others=None)
 
     async def jog_part(
         self,
@@ -144,7 +144,7 @@ class MotionChecks:
         commanded: float = 0.0,
         more: bool = True,
         request: CommandRequest | None = None,
-    ) -> tuple[Positions, Extended, CheckResult]:
+    ) -> tuple[Positions, Extended, CheckVerdict]:
         """Plan and check the next part of a jog; return also the robot's positions from which it was checked.
 
         With every policy but "off", what "require" refuses ends the jog.
@@ -181,7 +181,7 @@ class MotionChecks:
         warnings = (*extended.uncovered, *extended.warnings, *(() if left_out is None else (left_out,)))
         code = _SKIPPED if extended.uncovered or left_out else _CLOSE
         required = others if self.policy is Policy.REQUIRE else None
-        return start, extended, CheckResult(warning=_combined(warnings), code=code, others=required)
+        return start, extended, CheckVerdict(warning=_combined(warnings), code=code, others=required)
 
     def occupancy(self) -> Occupancy:
         """Return the positions that this robot may occupy from now on."""
@@ -197,11 +197,11 @@ class MotionChecks:
             return Occupancy(unknown=codes.OTHER_MOVES())
         return Occupancy(path=(controller.positions, *ahead))
 
-    def changed(self, check_result: CheckResult) -> Reason | None:
+    def changed(self, check_verdict: CheckVerdict) -> Reason | None:
         """Return the reason if the cell has changed since a motion was checked; None: unchanged."""
-        if check_result.start and not self.is_resting_at(check_result.start):
+        if check_verdict.start and not self.is_resting_at(check_verdict.start):
             return codes.ROBOT_MOVED()
-        for name, checked in (check_result.others or {}).items():
+        for name, checked in (check_verdict.others or {}).items():
             now = self._cell_occupancy.others(self._name, self._cell)[name]
             # A moving robot was checked along its whole path; a resting one must still be in its place.
             left = len(checked) == 1 and now.path and not self._near(now.path[0], checked[0])
@@ -295,10 +295,10 @@ class MotionChecks:
         left_out = [codes.CHECK_OTHERS_LEFT_OUT(*unknown)] if unknown else []
         return known, _combined([*([] if set_up is None else [set_up]), *left_out])
 
-    def _not_checked(self, *why: Reason) -> CheckResult:
+    def _not_checked(self, *why: Reason) -> CheckVerdict:
         if self.policy is Policy.REQUIRE:
-            return CheckResult(refusal=not_sent(codes.CHECK_REQUIRED(*why)))
-        return CheckResult(warning=codes.CHECK_SKIPPED(*why), code=_SKIPPED)
+            return CheckVerdict(refusal=not_sent(codes.CHECK_REQUIRED(*why)))
+        return CheckVerdict(warning=codes.CHECK_SKIPPED(*why), code=_SKIPPED)
 
     def _evaluate(
         self,
@@ -308,18 +308,18 @@ class MotionChecks:
         others: Mapping[str, tuple[Positions, ...]],
         *,
         program: bool = False,
-    ) -> CheckResult:
+    ) -> CheckVerdict:
         warnings = checked.warnings if left_out is None else (*checked.warnings, left_out)
         if self.policy is Policy.REQUIRE:
             if checked.uncovered:
                 return self._not_checked(*_first_few(checked.uncovered))
             if checked.refusals and program:
-                return CheckResult(refusal=_refused("Not run", _first_few(checked.refusals)))
+                return CheckVerdict(refusal=_refused("Not run", _first_few(checked.refusals)))
             if checked.refusals:
-                return CheckResult(refusal=not_sent(codes.CHECK_ON_ITS_WAY(*_first_few(checked.refusals))))
-            return CheckResult(warning=_combined(warnings), start=start, others=others)
+                return CheckVerdict(refusal=not_sent(codes.CHECK_ON_ITS_WAY(*_first_few(checked.refusals))))
+            return CheckVerdict(warning=_combined(warnings), start=start, others=others)
         code = _FAILED if checked.refusals else _SKIPPED if left_out or checked.uncovered else _CLOSE
-        return CheckResult(warning=_combined((*checked.refusals, *checked.uncovered, *warnings)), code=code)
+        return CheckVerdict(warning=_combined((*checked.refusals, *checked.uncovered, *warnings)), code=code)
 
 
 def _moves(controller: ControllerState, moving: bool | None) -> bool:

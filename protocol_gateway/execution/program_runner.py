@@ -151,10 +151,10 @@ class ProgramRunner:
         Raises:
             RefusedError: If it is refused, with the reason; the robot has not moved.
         """
-        verdict = self._control.admit(request, operator)
-        if verdict.repeat or not verdict.answer.accepted:
+        admission = self._control.admit(request, operator)
+        if admission.repeat or not admission.answer.accepted:
             # A refusal here is final, even if its reason disappears, because the program was not planned.
-            prepared = _Prepared(None if verdict.answer.accepted else verdict.answer)
+            prepared = _Prepared(None if admission.answer.accepted else admission.answer)
             return await self._begin(request, prepared, operator=operator, source=source)
         with self._control.preparing_program() as cancelled:
             try:
@@ -212,28 +212,28 @@ class ProgramRunner:
         """Check a program."""
         if len(request.program.encode()) > MOST_BYTES:
             raise CheckError(codes.PROGRAM_TOO_LONG(kib=MOST_BYTES // 1024))
-        checked, check_result = await self._checks.program(request.program)
+        checked, check_verdict = await self._checks.program(request.program)
         newest_stop = self._control.authority.last_stop_id
-        if check_result.refusal is not None:
-            return _Prepared(check_result.refusal)
+        if check_verdict.refusal is not None:
+            return _Prepared(check_verdict.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
         # Refuse now if the present state (not homed, on hold) would refuse the first step.
         if first is not None and (problem := self._control.obstacle(_request(first, ""))) is not None:
             return _Prepared(problem)
         name = one_line(request.program_name, LONGEST_TEXT).strip() or "unnamed"
-        if check_result.warning is not None:
+        if check_verdict.warning is not None:
             self._journal.report(
                 _S.WARNING,
-                check_result.code,
-                f"program {name}: {check_result.warning}",
-                why=check_result.warning,
+                check_verdict.code,
+                f"program {name}: {check_verdict.warning}",
+                why=check_verdict.warning,
                 program=name,
             )
         targets = tuple(tuple(each.target.tolist()) for each in checked.steps if each.target is not None)
-        program = PlannedProgram(name=name, targets=targets, start=check_result.start)
+        program = PlannedProgram(name=name, targets=targets, start=check_verdict.start)
         lines = tuple(request.program.split("\n"))
         run = _Run(program, operator, request.lease, newest_stop, lines, checked)
-        return _Prepared(None, check_result.warning, run)
+        return _Prepared(None, check_verdict.warning, run)
 
     def _start(self, run: _Run) -> None:
         self._wait_s = None

@@ -19,7 +19,7 @@ from robots.kinematics.straight_motion import HOMING_REST_S, HOMING_SPEED, strai
 from robots.programs.plan import plan_program
 from robots.programs.steps import (
     INTERPOLATION,
-    CheckResult,
+    CheckReport,
     Plan,
     Step,
     StepKind,
@@ -44,7 +44,7 @@ def check_program(
     others: Mapping[str, FloatArray] | None = None,
     solver: InverseSolver | None = None,
     far: bool = True,
-) -> CheckResult:
+) -> CheckReport:
     """Parse, plan and check a program; a text that cannot be read gets violations of kind "program".
 
     Args:
@@ -77,7 +77,7 @@ def check_plan(
     *,
     others: Mapping[str, FloatArray],
     far: bool = True,
-) -> CheckResult:
+) -> CheckReport:
     """Check steps against limits, tool speeds, self-collisions and the obstacles of the cell.
 
     Args:
@@ -279,7 +279,7 @@ def _unreported(runs: Runs) -> tuple[Reason, ...]:
     return (codes.CHECK_NOTE_MORE_VIOLATIONS(count=runs.unreported),) if runs.unreported else ()
 
 
-def _unreadable(error: ProgramError, start: FloatArray) -> CheckResult:
+def _unreadable(error: ProgramError, start: FloatArray) -> CheckReport:
     found = tuple(
         Violation(
             line=line,
@@ -300,8 +300,8 @@ def _result(
     steps: tuple[Step, ...],
     notes: tuple[Reason, ...],
     path: PathSamples,
-) -> CheckResult:
-    return CheckResult(
+) -> CheckReport:
+    return CheckReport(
         ok=not found,
         duration_s=duration_s,
         violations=found,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robomesh.extras import missing
 from robots.kinematics.joints import FloatArray, Joints, JointType
-from robots.programs.steps import CheckResult, Violation, ViolationKind
+from robots.programs.steps import CheckReport, Violation, ViolationKind
 from robots.schema.errors import SaveError
 
 FORMATS = (".png", ".svg")
@@ -24,7 +24,7 @@ _MOST_BANDS = 40
 _MOST_LINE_NUMBERS = 24
 
 
-def plot_check(result: CheckResult, joints: Joints, target: Path, *, title: str) -> None:
+def plot_check(result: CheckReport, joints: Joints, target: Path, *, title: str) -> None:
     """Draw a check's motion over time as PNG or SVG.
 
     Args:
@@ -57,7 +57,7 @@ def plot_check(result: CheckResult, joints: Joints, target: Path, *, title: str)
             raise SaveError(target, error.strerror or str(error)) from None
 
 
-def _draw(result: CheckResult, joints: Joints, all_axes: Sequence[Any], title: str) -> None:
+def _draw(result: CheckReport, joints: Joints, all_axes: Sequence[Any], title: str) -> None:
     path = result.path
     count = len(path.times_s)
     drawn = np.linspace(0, max(count - 1, 0), min(count, _DRAWN)).astype(np.int64)

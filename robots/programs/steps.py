@@ -130,8 +130,8 @@ class SampledPath:
 
 
 @dataclass(frozen=True, eq=False)
-class CheckResult:
-    """The result of a check.
+class CheckReport:
+    """All findings of the check of a plan.
 
     Attributes:
         ok: There is no violation.

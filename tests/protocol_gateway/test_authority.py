@@ -227,8 +227,8 @@ def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():
         (1, "RESET names stop 1, but stop 2 is latched (zhao: smoke)"),
         (0, "names stop 0"),
     ]:
-        verdict = admit(state, command(C.RESET, stop_id=stop_id), operator="li", now=at(2))
-        assert words in verdict.answer.text
+        admission = admit(state, command(C.RESET, stop_id=stop_id), operator="li", now=at(2))
+        assert words in admission.answer.text
     reset = command(C.RESET, stop_id=2)
     assert admit(state, reset, operator="li", now=at(2)).answer.accepted
     assert command_sent(state, reset, at(2)).stop is None
@@ -275,12 +275,12 @@ MOVE = {"joint_positions": [0.1, 0.0], "program_name": ""}
 def test_an_id_names_one_command_and_its_values(kind, fields, words):
     first = command(C.MOVE_ABSOLUTE, 5, **MOVE)
     state = keep_answer(held(), first, Answer(True, "done"))
-    verdict = admit(state, command(kind, 5, **fields), operator="li", now=at(0))
+    admission = admit(state, command(kind, 5, **fields), operator="li", now=at(0))
     if words:
-        assert words in verdict.answer.text
-        assert [verdict.repeat, verdict.id_used, verdict.answer.accepted] == [False] * 3
+        assert words in admission.answer.text
+        assert [admission.repeat, admission.id_used, admission.answer.accepted] == [False] * 3
     else:
-        assert verdict.repeat
+        assert admission.repeat
     late = command(C.MOVE_ABSOLUTE, 5, **MOVE)
     late.not_after.FromNanoseconds(1)
     assert admit(state, late, operator="li", now=at(9)).answer == Answer(True, "done")

@@ -102,11 +102,11 @@ class Machine(RuleBasedStateMachine):
         request = CommandRequest(
             lease=secret, id=number, command=command, stop_id=max(self.authority.last_stop_id - stop_back, 0)
         )
-        verdict = admit(self.authority, request, operator=name, now=self.now)
-        if verdict.repeat or not verdict.answer.accepted:
-            if verdict.id_used:
+        admission = admit(self.authority, request, operator=name, now=self.now)
+        if admission.repeat or not admission.answer.accepted:
+            if admission.id_used:
                 self.sent_under[secret] = number
-                self.authority = keep_answer(self.authority, request, verdict.answer)
+                self.authority = keep_answer(self.authority, request, admission.answer)
             return
         assert self.authority.lease is not None
         assert self.authority.lease.holder == name

@@ -6,7 +6,7 @@ import errno
 import pytest
 
 from controllers.unit.driver import UnitDriver
-from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
+from protocol_gateway.authority.decisions import CheckVerdict, PlannedProgram
 from protocol_gateway.authority.events import LeaseEnded, LinkLost, LinkRestored, MotionObserved
 from protocol_gateway.authority.lease_rules import Authority
 from protocol_gateway.authority.preconditions import ControllerState
@@ -84,9 +84,9 @@ class FailingPerformers:
 
     async def check(self, requests):
         self.call("check", FAULT)
-        return CheckResult()
+        return CheckVerdict()
 
-    def changed(self, check_result):
+    def changed(self, check_verdict):
         self.call("recheck", FAULT)
 
     def controller(self):

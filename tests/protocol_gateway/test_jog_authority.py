@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from protocol_gateway.authority.decisions import CheckResult, PlannedProgram
+from protocol_gateway.authority.decisions import CheckVerdict, PlannedProgram
 from protocol_gateway.authority.events import JogEnding, JogHeld, JogPartReady
 from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
@@ -32,7 +32,7 @@ def part(bench, percent=10.0, operator="li", secret=None):
             secret=bench.secret if secret is None else secret,
             target=(0.01, 0.0, 0.0, 0.0, 0.0),
             percent=percent,
-            check_result=CheckResult(),
+            check_verdict=CheckVerdict(),
         )
     )
 

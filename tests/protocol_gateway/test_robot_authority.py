@@ -7,7 +7,7 @@ import pytest
 
 from controllers.unit.driver import UnitDriver
 from protocol_gateway.authority import decisions, events
-from protocol_gateway.authority.decisions import CheckResult, PlannedProgram, Snapshot
+from protocol_gateway.authority.decisions import CheckVerdict, PlannedProgram, Snapshot
 from protocol_gateway.authority.lease_rules import Authority, Now
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.authority.robot_authority import RobotAuthority
@@ -51,7 +51,7 @@ class Bench:
         self.seen = SEEN
         self.performed = []
         self.during = {}
-        self.check_result = CheckResult()
+        self.check_verdict = CheckVerdict()
         self.link = self.disk = self.changed = None
         self.cancelled = False
 
@@ -71,7 +71,7 @@ class Bench:
                 "Stop": self.link,
                 "Send": self.link,
                 "Append": (self.disk, self.seen),
-                "CheckMotion": self.check_result,
+                "CheckMotion": self.check_verdict,
                 "Recheck": self.changed,
                 "EnterCell": self.seen,
                 "NumberStop": self.robot_authority.authority.last_stop_id + 1,

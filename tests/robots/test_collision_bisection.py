@@ -11,7 +11,7 @@ from robots.collision.distance import Gauge
 from robots.collision.path import placements_along
 from robots.collision.swept_volumes import sweeps_of, swept_region
 from robots.descriptions.cells import CellDescription, CellRobot
-from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
+from robots.programs.steps import CheckReport, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed, two_cheeks
 
 PLATE_M = 0.001
@@ -26,12 +26,12 @@ BLADE = """<robot name="blade">
 <axis xyz="1 0 0"/><limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
-def moved(cell: Cell, robot: str, start: list[float], target: list[float]) -> CheckResult:
+def moved(cell: Cell, robot: str, start: list[float], target: list[float]) -> CheckReport:
     step = Step(line=1, kind=StepKind.MOVE, target=np.array(target))
     return check_plan(cell, robot, np.array(start), [step], others={})
 
 
-def kinds(result: CheckResult) -> list[ViolationKind]:
+def kinds(result: CheckReport) -> list[ViolationKind]:
     return [each.kind for each in result.violations]
 
 

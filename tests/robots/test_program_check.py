@@ -17,7 +17,7 @@ from robots.kinematics.model import tool_jacobian, tool_placement
 from robots.kinematics.motion import Motion
 from robots.kinematics.singularity import reach_of, singularity_margin, singularity_margins
 from robots.kinematics.straight_motion import HOMING_REST_S
-from robots.programs.steps import CheckResult, Step, StepKind, ViolationKind
+from robots.programs.steps import CheckReport, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed
 
 STRETCHED = np.zeros(2)
@@ -45,11 +45,11 @@ def pt600() -> Cell:
     return build_cell(cell_of({"arm": ("pt600", placed(0))}))
 
 
-def checked(cell: Cell, text: str, start: np.ndarray = STRETCHED) -> CheckResult:
+def checked(cell: Cell, text: str, start: np.ndarray = STRETCHED) -> CheckReport:
     return check_program(text, cell, "arm", start)
 
 
-def kinds(result: CheckResult) -> list[str]:
+def kinds(result: CheckReport) -> list[str]:
     return [str(each.kind) for each in result.violations]
 
 

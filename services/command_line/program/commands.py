@@ -18,7 +18,7 @@ from services.errors import ServiceError
 if TYPE_CHECKING:
     from robots.collision import Cell
     from robots.kinematics.joints import FloatArray, Joints
-    from robots.programs.steps import CheckResult, Step, Violation
+    from robots.programs.steps import CheckReport, Step, Violation
 
 app = command_group("program", "Teach programs: check, plan, from CAD.")
 
@@ -245,7 +245,7 @@ def _between(option: str, value: float, lowest: float, highest: float) -> float:
 # ------------------------------------------------------------------------------ output
 
 
-def _result_json(result: "CheckResult", notes: list[str]) -> dict[str, Any]:
+def _result_json(result: "CheckReport", notes: list[str]) -> dict[str, Any]:
     return {
         "ok": result.ok,
         "duration_s": result.duration_s,
@@ -280,7 +280,7 @@ def _step_json(step: "Step") -> dict[str, Any]:
     return values
 
 
-def _print_result(file: str, result: "CheckResult", notes: list[str]) -> None:
+def _print_result(file: str, result: "CheckReport", notes: list[str]) -> None:
     from robots.programs.steps import ViolationKind
     from robots.programs.write import number
 

@@ -10,7 +10,7 @@ from robots.checks.check import check_program
 from robots.collision import Cell
 from robots.kinematics.inverse import InverseSolver
 from robots.kinematics.joints import FloatArray
-from robots.programs.steps import CheckResult, SampledPath
+from robots.programs.steps import CheckReport, SampledPath
 
 
 def check_answer(
@@ -36,7 +36,7 @@ def check_answer(
     return answer_of(result, path=request.path)
 
 
-def answer_of(result: CheckResult, *, path: bool) -> schema.CheckAnswer:
+def answer_of(result: CheckReport, *, path: bool) -> schema.CheckAnswer:
     """Return a check's result as a message.
 
     Args:
