@@ -1,4 +1,4 @@
-"""Untrusted texts for display: on one line, without characters that hide or reorder text."""
+"""Lists in texts; untrusted texts for display: on one line, without characters that hide or reorder text."""
 
 import re
 import unicodedata
@@ -9,6 +9,11 @@ DIRECTION = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\
 # Characters that a file's name has on no system, or not on every one.
 _IN_NO_FILE_NAME = re.compile(r'[/\\:*?"<>|]')
 _SHOWN = {ord(each): f"<U+{ord(each):04X}>" for each in DIRECTION}
+
+
+def split_commas(text: str) -> tuple[str, ...]:
+    """Return the parts of a list with commas."""
+    return tuple(part for each in text.split(",") if (part := each.strip()))
 
 
 def one_line(text: str, longest: int = 200) -> str:

@@ -31,6 +31,7 @@ from protocol_gateway.driver_parts.only_reads import check_no_type_codes
 from protocol_gateway.driver_parts.pendant_text import text
 from protocol_gateway.driver_parts.polling import Asked, Polling, Regular
 from protocol_gateway.driver_parts.polling_reader import PollingReader, malformed
+from protocol_gateway.driver_parts.signal_names import of_bits
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -199,7 +200,7 @@ class SnpxDriver(PollingReader[Question, Answer]):
             events += _status(bits)
         for each in self._io.get(question, ()):
             shifted = bits >> (each.first_bit - question.first)
-            events.append(signals.of_io(self._io_signals[each], shifted))
+            events.append(of_bits(self._io_signals[each], shifted))
         return events
 
     def _of_block(self, question: Read, block: Block, words: bytes, now_s: float) -> list[ControllerEvent]:

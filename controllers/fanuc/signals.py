@@ -138,8 +138,3 @@ def register(number: int) -> Signal:
 def io_signals(bits: SignalBits) -> tuple[Signal, ...]:
     """Return the signals of inputs or outputs, by their numbers on the pendant."""
     return numbered(_KINDS[bits.kind], range(bits.first, bits.last + 1))
-
-
-def of_io(signals: Sequence[Signal], value: int) -> SignalsReceived:
-    """Return inputs or outputs, the first in the lowest bit."""
-    return SignalsReceived([(signal, bool(value >> bit & 1)) for bit, signal in enumerate(signals)])

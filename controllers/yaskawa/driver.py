@@ -15,7 +15,7 @@ from controllers.yaskawa.hses import Answer, Command, Read, Service, decode
 from protocol_gateway.driver_parts.only_reads import check_no_type_codes
 from protocol_gateway.driver_parts.polling import Polling, Regular
 from protocol_gateway.driver_parts.polling_reader import PollingReader, malformed
-from protocol_gateway.driver_parts.signal_names import of_joints
+from protocol_gateway.driver_parts.signal_names import of_bits, of_joints
 from protocol_gateway.seam import (
     Activity,
     AlarmReceived,
@@ -165,7 +165,7 @@ class HsesDriver(PollingReader[Read, Answer]):
             case Command.TORQUE if self._axes is not None:
                 return [signals.of_torques(self._loads, self._axes.used, payloads.torques(data))]
             case Command.IO:
-                return [signals.of_io(self._io[question], payloads.io_byte(data))]
+                return [of_bits(self._io[question], payloads.io_byte(data))]
             case _:
                 return []
 

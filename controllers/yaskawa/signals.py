@@ -93,8 +93,3 @@ def io_signals(group: int) -> tuple[Signal, ...]:
             number = (group - first) * 8 + 1
             return numbered(name, range(number, number + 8))
     return numbered("hses.io", range(group * 10, group * 10 + 8))
-
-
-def of_io(signals: Sequence[Signal], value: int) -> SignalsReceived:
-    """Return the signals of a group."""
-    return SignalsReceived([(signal, bool(value >> bit & 1)) for bit, signal in enumerate(signals)])

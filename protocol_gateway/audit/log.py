@@ -39,6 +39,7 @@ from protocol_gateway.audit.recovery import Recovery, find_end
 from protocol_gateway.authority.audit_entry import GATEWAY, Entry, Outcome, chain_entry
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
+from robomesh.files.atomic_write import fsync_folder
 from robomesh.reasons import Reason
 
 __all__ = ["AuditLog", "Entry", "Outcome", "Verification", "read_entries", "verify"]
@@ -275,7 +276,7 @@ class AuditLog:
         written = _write_all(self._file, b"".join(lines), end.length)
         os.fsync(self._file)
         if not self._name_synced:
-            _sync_folder(self.path.parent)
+            fsync_folder(self.path.parent)
             self._name_synced = True
         self._torn = False
         self._end = replace(end, length=end.length + written)
@@ -359,11 +360,3 @@ def _write_all(file: int, data: bytes, place: int) -> int:
     while written < len(data):
         written += os.pwrite(file, data[written:], place + written)
     return written
-
-
-def _sync_folder(folder: Path) -> None:
-    number = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)

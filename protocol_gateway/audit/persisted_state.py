@@ -6,7 +6,7 @@ which holds the state after the older files, so that a start reads only one file
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -120,14 +120,6 @@ def merge(state: PersistedState, latch: LatchState | None) -> MergedState:
         state = replace(state, stop=latch.stop, cleared=None, last_stop_id=last)
         return MergedState(state, unsent=latch.stop)
     return MergedState(replace(state, last_stop_id=last))
-
-
-def authority_after(entries: Iterable[Entry]) -> Authority:
-    """Return the authority after a log's entries, oldest first."""
-    state = EMPTY
-    for entry in entries:
-        state = apply_entry(state, entry)
-    return state.authority
 
 
 def to_values(state: PersistedState) -> dict[str, str]:

@@ -5,10 +5,10 @@ docs/signals.md explains them. A value for which no name fits gets one that begi
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from protocol_gateway.seam.events import Signal
+from protocol_gateway.seam.events import Signal, SignalsReceived
 
 TEXT, BOOLEAN = "text", "boolean"
 
@@ -122,3 +122,8 @@ def numbered(name: str, numbers: range, unit: str = "") -> tuple[Signal, ...]:
 def of_axes(name: str, unit: str, axes: str = "x y z") -> tuple[Signal, ...]:
     """Return the signals of a vector: "tool.force" becomes "tool.force.x", ..."""
     return tuple(Signal(f"{name}.{axis}", unit) for axis in axes.split())
+
+
+def of_bits(signals: Sequence[Signal], value: int) -> SignalsReceived:
+    """Return the values of signals in the bits of a number, the first in the lowest bit."""
+    return SignalsReceived([(signal, bool(value >> bit & 1)) for bit, signal in enumerate(signals)])

@@ -66,11 +66,6 @@ def number_of(answer: Answer) -> int:
     return FAULT if answer.reason is None else _NUMBERS.get(answer.reason.code, FAULT)
 
 
-def asks_to_stop(records: Sequence[Record]) -> bool:
-    """Return whether a unit holds a stop, which every client may send."""
-    return any(isinstance(record, Command) and "stop" in record.words for record in records)
-
-
 def asks_for_more(records: Sequence[Record]) -> bool:
     """Return whether a unit holds more than stops and a controller's state."""
     return not all(

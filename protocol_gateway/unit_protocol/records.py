@@ -117,6 +117,11 @@ def write_unit(records: Iterable[Record], table: CodeTable = codes.NAMES) -> byt
     return format_unit([raw for record in records for raw in _write(record, table)])
 
 
+def asks_to_stop(records: Iterable[Record]) -> bool:
+    """Return whether a unit holds a stop, which is executed for every client, even if the rest is refused."""
+    return any(isinstance(record, Command) and "stop" in record.words for record in records)
+
+
 def speed_percent(word: str) -> float | None:
     """Return the number of a `speed=NN` word; None: another word.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from robomesh.contract.certificate_identity import Identity, read_identity
 from robomesh.contract.endpoints import DEFAULT_ROUTER, bundle
 from robomesh.errors import NoAnswerError, SessionError
+from robomesh.texts import split_commas
 from robomesh.wire.session import Session, SessionSettings, open_session
 
 # A router that has just started does not know itself yet.
@@ -29,11 +30,6 @@ def own_identity(keys: Path | None) -> Identity | None:
     return identity
 
 
-def addresses(text: str) -> tuple[str, ...]:
-    """Return the addresses in a text with commas."""
-    return tuple(part for each in text.split(",") if (part := each.strip()))
-
-
 def connection_settings(
     routers: str | Sequence[str], keys: Path | None = None, *, wait_s: float | None = None
 ) -> SessionSettings:
@@ -47,7 +43,7 @@ def connection_settings(
     Raises:
         SessionError: If no router is named, the file is not a bundle, or a router is not reached by TLS.
     """
-    named = addresses(routers) if isinstance(routers, str) else tuple(routers)
+    named = split_commas(routers) if isinstance(routers, str) else tuple(routers)
     if not named:
         raise SessionError(f"no router is named: an address is {DEFAULT_ROUTER}")
     identity = own_identity(keys)

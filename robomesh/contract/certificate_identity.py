@@ -17,6 +17,7 @@ from pathlib import Path
 
 from robomesh.contract.topic_schema import Role
 from robomesh.errors import SessionError
+from robomesh.texts import split_commas
 
 _BEGIN = "-----BEGIN"
 _MOST_BYTES = 1 << 18
@@ -76,12 +77,8 @@ def read_identity(path: Path) -> Identity | None:
             name=lines["Name"],
             role=Role(lines["Role"]),
             expires=datetime.fromisoformat(lines["Expires"]).astimezone(UTC) if "Expires" in lines else None,
-            robots=frozenset(_listed(lines["Robots"])) if "Robots" in lines else None,
-            routers=_listed(lines.get("Routers", "")),
+            robots=frozenset(split_commas(lines["Robots"])) if "Robots" in lines else None,
+            routers=split_commas(lines.get("Routers", "")),
         )
     except (KeyError, ValueError):
         return None
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    return tuple(part for each in text.split(",") if (part := each.strip()))

@@ -153,18 +153,3 @@ def sampled_pieces(arm: Arm, pieces: FloatArray) -> Iterator[tuple[FloatArray, F
                 else:
                     counts[number] = int(np.ceil(1.1 * counts[number] * farthest / SAMPLE_M))
         yield from (found[number] for number in range(len(part)))
-
-
-def sampled_path(arm: Arm, path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sample a path of straight joint lines so that no body travels more than SAMPLE_M between two samples.
-
-    Args:
-        path: (k, n) the lines' ends [rad] or [m].
-
-    Returns:
-        (m, bodies, 4, 4) of the bodies to the site, and (m, bodies) travelled distances [m].
-    """
-    lines = np.stack([path[:-1], path[1:]], axis=1)
-    pieces = [placements[1:] for placements, _ in sampled_pieces(arm, pieces_of(lines))]
-    placements = np.concatenate([placements_along(arm, path[:1]), *pieces])
-    return placements, travelled(arm.bodies, placements)

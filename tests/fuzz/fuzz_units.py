@@ -15,14 +15,14 @@ from collections.abc import Mapping, Sequence
 from google.protobuf.message import Message
 
 from controllers.unit.driver import UnitDriver
-from protocol_gateway.legacy.requests import asks_for_more, asks_to_stop, requests_of
+from protocol_gateway.legacy.requests import asks_for_more, requests_of
 from protocol_gateway.link.timestamping import EventTime, Timestamper
 from protocol_gateway.seam import JointsReceived
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
 from protocol_gateway.telemetry.telemetry import Telemetry
 from protocol_gateway.unit_protocol.codes import TYPES, code_table
-from protocol_gateway.unit_protocol.records import Error
+from protocol_gateway.unit_protocol.records import Error, asks_to_stop
 from protocol_gateway.unit_protocol.stream import Unit, UnitStream
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of

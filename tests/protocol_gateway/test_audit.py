@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
-from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.seam.errors import AuditError
 from tests.conftest import run
+from tests.protocol_gateway.audit_state import state_after
 
 HOUSE = Path(__file__).resolve().parents[2]
 
@@ -247,5 +247,5 @@ def test_confirmed_entries_survive_kill_9(tmp_path):
     ],
 )
 def test_a_stop_without_reset_is_restored_from_the_log(entries, latched):
-    stop = authority_after(entries).stop
+    stop = state_after(entries).stop
     assert (stop.id if stop else None) == latched

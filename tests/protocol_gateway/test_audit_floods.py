@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from protocol_gateway.audit.flood_counter import IN_FULL, MOST_KINDS, FloodCounter
 from protocol_gateway.audit.log import Entry, Outcome
-from protocol_gateway.audit.persisted_state import authority_after
+from tests.protocol_gateway.audit_state import state_after
 
 
 def entry(operator="li", request="HOME", outcome=Outcome.REFUSED, text="no", **values):
@@ -119,9 +119,9 @@ def test_every_request_is_counted_once_and_the_last_stop_is_remembered(asked):
             written.append(one)
     # Entries before a RESET in the log.
     written += floods.counts(now_s, request="STOP")
-    latched = authority_after(written).stop
+    latched = state_after(written).stop
     assert (latched.id if latched else 0) == stop
-    assert authority_after(written).last_stop_id == stop
+    assert state_after(written).last_stop_id == stop
     written += floods.counts(now_s)
     for request in ("STOP", "HOME"):
         counted = sum(1 + each.repeated for each in written if each.request == request)

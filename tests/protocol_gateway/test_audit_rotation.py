@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from protocol_gateway.audit.files import older_parts, part_name
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries, verify
-from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.audit.search import Query, find, matches, query_of
 from protocol_gateway.authority.lease_rules import LatchedStop
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
+from tests.protocol_gateway.audit_state import state_after
 from tests.refusals import refused
 
 SMALL = 2000
@@ -153,7 +153,7 @@ def test_every_file_holds_the_state_for_a_restart(tmp_path, asked, latched, afte
     live = tmp_path / "arm.jsonl"
     # Rotated after each entry, so that the state crosses files at each step.
     write(live, *asked, *(entry(9) for _ in range(after)), rotate_bytes=1)
-    expected = authority_after(read_entries(live))
+    expected = state_after(read_entries(live)).authority
     for part in older_parts(live):
         part.unlink()
     memory, _ = write(live)
@@ -166,7 +166,7 @@ def test_every_file_holds_the_state_for_a_restart(tmp_path, asked, latched, afte
 
 def test_a_late_count_of_older_stops_does_not_replace_the_newest():
     entries = [entry(1, "STOP", stop_id=9, operator="wang"), entry(2, "STOP", stop_id=8)]
-    assert authority_after(entries).stop.id == 9
+    assert state_after(entries).stop.id == 9
 
 
 KILLED = """

@@ -13,7 +13,6 @@ from protocol_gateway.authority.lease_rules import Authority, LatchedStop
 from protocol_gateway.authority.preconditions import ControllerState
 from protocol_gateway.legacy.requests import (
     asks_for_more,
-    asks_to_stop,
     number_of,
     requests_of,
     stop_to_reset,
@@ -28,7 +27,7 @@ from protocol_gateway.seam import (
     Recovery,
     StatusReceived,
 )
-from protocol_gateway.unit_protocol.records import Error, read_records, write_unit
+from protocol_gateway.unit_protocol.records import Error, asks_to_stop, read_records, write_unit
 from protocol_gateway.unit_protocol.stream import Unit, UnitStream
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest, Recover

@@ -8,13 +8,13 @@ import pytest
 import zenoh
 
 from protocol_gateway.audit.log import Outcome, read_entries
-from protocol_gateway.audit.persisted_state import authority_after
 from protocol_gateway.authority.events import FateUnknown, LinkRestored, MotionObserved, TimePassed
 from protocol_gateway.authority.robot_authority import NEW_STOPS_BURST
 from protocol_gateway.seam import Mode
 from robomesh import reason_codes as codes
 from robomesh.errors import NoAnswerError
 from robomesh.schemas import robomesh_pb2 as schema
+from tests.protocol_gateway.audit_state import state_after
 from tests.protocol_gateway.control_bench import control_bench
 from tests.protocol_gateway.gateway_site import gateway, measured, simulator
 from tests.refusals import refused
@@ -57,7 +57,7 @@ async def test_a_flood_under_many_names_latches_few_stops_and_is_counted(tmp_pat
     entries = list(read_entries(bench.log.path))
     assert sum(1 + entry.repeated for entry in entries) == 1000
     assert len(entries) == numbers[-1] + 1
-    assert authority_after(entries).stop.id == numbers[-1]
+    assert state_after(entries).stop.id == numbers[-1]
 
 
 async def test_a_stop_while_a_reset_is_being_written_is_not_cleared_by_it(tmp_path):
@@ -199,8 +199,8 @@ async def test_a_repeated_stop_unit_is_audited_and_latches_nothing(tmp_path, clo
     assert {entry.values["stop_id"] for entry in entries} == {"1"}
     assert "when its link came back" in entries[1].text
     assert "was sent again" in entries[2].text
-    assert authority_after(entries[1:]).stop is None
-    assert authority_after(entries).stop.by == "wang"
+    assert state_after(entries[1:]).stop is None
+    assert state_after(entries).stop.by == "wang"
 
 
 async def test_a_stop_is_not_reset_while_the_robot_moves(tmp_path):

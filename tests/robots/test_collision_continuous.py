@@ -16,8 +16,9 @@ from robots.collision import (
     own_contacts,
     path_encounters,
 )
+from robots.collision.cell import Arm
 from robots.collision.distance import arm_obstacles
-from robots.collision.path import SAMPLE_M, placements_along, sampled_path, travelled
+from robots.collision.path import SAMPLE_M, pieces_of, placements_along, sampled_pieces, travelled
 from robots.descriptions.cells import CellDescription, CellRobot
 from robots.kinematics.joints import FloatArray
 from tests.robots.arms import TELESCOPE
@@ -79,6 +80,13 @@ def test_path_check_equals_the_check_of_each_sample(cell: Cell, beside: dict[str
     # The path must have encounters and free samples to show anything.
     assert 5 < near < len(path) / 7 - 5
     assert touching > 0
+
+
+def sampled_path(arm: Arm, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    lines = np.stack([path[:-1], path[1:]], axis=1)
+    pieces = [placements[1:] for placements, _ in sampled_pieces(arm, pieces_of(lines))]
+    placements = np.concatenate([placements_along(arm, path[:1]), *pieces])
+    return placements, travelled(arm.bodies, placements)
 
 
 def test_another_arms_path_counts_as_all_of_its_positions(cell: Cell) -> None:

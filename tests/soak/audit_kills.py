@@ -27,12 +27,12 @@ from pathlib import Path
 import zenoh
 
 from protocol_gateway.audit.log import read_entries, verify
-from protocol_gateway.audit.persisted_state import authority_after
 from robomesh.contract.endpoints import router_config
 from robomesh.errors import NoAnswerError, RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
 from tests.ports import free_port
+from tests.protocol_gateway.audit_state import state_after
 
 C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action
@@ -163,7 +163,7 @@ class Trial:
         shown = state.stop.id if state.HasField("stop") else 0
         begun_s = time.monotonic()
         while True:
-            logged = authority_after(read_entries(self.log)).stop
+            logged = state_after(read_entries(self.log)).stop
             # One that the gateway latched for a torn line is written in its first second.
             if shown == (logged.id if logged else 0) or time.monotonic() - begun_s > READY_S:
                 break

@@ -25,7 +25,6 @@ from controllers.unit.simulated.execution import (
     SetSpeed,
     Situation,
     Word,
-    asks_to_stop,
     orders_of,
 )
 from protocol_gateway.unit_protocol.codes import code_table
@@ -36,6 +35,7 @@ from protocol_gateway.unit_protocol.records import (
     Status,
     Time,
     Velocities,
+    asks_to_stop,
 )
 from protocol_gateway.unit_protocol.scales import si_scales
 from robots.kinematics.joints import FloatArray, Joints

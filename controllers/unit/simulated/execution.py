@@ -81,11 +81,6 @@ def orders_of(records: Sequence[Record], joints: Joints, situation: Situation) -
     return orders
 
 
-def asks_to_stop(records: Sequence[Record]) -> bool:
-    """Return whether a unit holds a stop, which is executed even if the rest is refused."""
-    return any(isinstance(record, Command) and "stop" in record.words for record in records)
-
-
 def _orders_of_record(record: Record, joints: Joints, situation: Situation) -> Sequence[Order] | Error:
     match record:
         case Command(words):

@@ -9,13 +9,14 @@ from collections.abc import Callable
 from controllers.simulated.faults import Faults, copies, pieces
 from controllers.unit.simulated import unit_faults
 from controllers.unit.simulated.controller import Controller
-from controllers.unit.simulated.execution import MALFORMED, asks_to_stop
+from controllers.unit.simulated.execution import MALFORMED
 from protocol_gateway.serving.client import Client
 from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Command,
     Error,
     RelativePositions,
+    asks_to_stop,
     write_unit,
 )
 from protocol_gateway.unit_protocol.stream import Malformed, StreamEvent, Unit

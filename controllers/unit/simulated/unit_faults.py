@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Collection, Iterator, Sequence
 
 from controllers.simulated.fault_table import displacement
-from controllers.unit.simulated.execution import FAULT, LOCAL, asks_to_stop
+from controllers.unit.simulated.execution import FAULT, LOCAL
 from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Command,
@@ -12,6 +12,7 @@ from protocol_gateway.unit_protocol.records import (
     Record,
     Status,
     Velocities,
+    asks_to_stop,
 )
 
 _TEXT = "drive of axis 1 overheated (simulated)"

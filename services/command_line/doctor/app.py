@@ -25,10 +25,10 @@ def doctor(
 ) -> int | None:
     """Check this machine, and say how to fix what is missing."""
     if security:
-        from robomesh.client.connection import addresses
+        from robomesh.texts import split_commas
         from services.command_line.doctor import security as check
 
-        return check.run(keys_folder(folder, quiet=as_json), addresses(routers), as_json)
+        return check.run(keys_folder(folder, quiet=as_json), split_commas(routers), as_json)
     from services.command_line.doctor import machine as command
 
     command.run(site, as_json)

@@ -14,6 +14,7 @@ import typer
 from protocol_gateway.configuration.kinds import own_kinds
 from protocol_gateway.seam.kind import Kind, named
 from robomesh.contract.topic_schema import Role
+from robomesh.texts import split_commas
 from robots.schema.bounded_toml import read_toml
 from services.command_line.terminal.local_time import time_text
 from services.command_line.terminal.options import Json, command_group
@@ -102,13 +103,15 @@ def issue(
             not name and not role and not robots,
             "--guest takes no name, --role or --robots; for a hub add --sites",
         )
-        entry = site_keys.issue_guest(where, guest, sites=_listed(sites), lifetime=lifetime)
+        entry = site_keys.issue_guest(where, guest, sites=split_commas(sites), lifetime=lifetime)
     else:
         _require(
             bool(name and role), "a name and --role are needed, as in: robomesh keys issue li --role operator"
         )
         _require(not sites, "--sites is for --guest")
-        entry = site_keys.issue(where, name, _role(role), robots=_listed(robots) or None, lifetime=lifetime)
+        entry = site_keys.issue(
+            where, name, _role(role), robots=split_commas(robots) or None, lifetime=lifetime
+        )
     file = site_keys.file_of(where, site_keys.principals_of(where).site, entry)
     if as_json:
         _print(_record(entry) | {"file": file})
@@ -148,7 +151,7 @@ def accept(
 
     certificate = read(file)
     try:
-        site = site_keys.accept(keys_folder(folder), certificate, sites=_listed(sites))
+        site = site_keys.accept(keys_folder(folder), certificate, sites=split_commas(sites))
     except KeysError as error:
         raise KeysError(f"{file}: {error}") from None
     print_line(f'site {site} admits us: connect = ["{site}"] under [router] in the site file links to it')
@@ -247,10 +250,6 @@ def _when(at: datetime | None) -> str:
 
 def _print(record: dict[str, Any]) -> None:
     print_json(record)
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    return tuple(part for each in text.split(",") if (part := each.strip()))
 
 
 def _role(text: str) -> Role:

@@ -2,11 +2,11 @@
 
 from importlib import import_module
 
-from robomesh.client.connection import addresses
 from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.contract.keys import WHOLE_SITE
 from robomesh.listen_address import own_addresses
 from robomesh.service import service
+from robomesh.texts import split_commas
 from robomesh.wire.session import SessionSettings
 from services.command_line.service_settings.controllers import ControllerError
 from services.command_line.service_settings.metrics_ports import own_address
@@ -52,7 +52,7 @@ def session_settings(site: Site, connect: str, certificate: str) -> SessionSetti
     given = with_keys(connect)
     if given is not None:
         return given
-    routers, tls = addresses(connect), site.tls_of(certificate)
+    routers, tls = split_commas(connect), site.tls_of(certificate)
     if routers == (DEFAULT_ROUTER,):
         routers = own_addresses(site.listened)
     return SessionSettings(connect=routers, tls=tls)

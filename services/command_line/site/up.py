@@ -14,10 +14,10 @@ from pathlib import Path
 
 from protocol_gateway.configuration.kinds import part_of
 from protocol_gateway.seam.simulated import Simulated
-from robomesh.client.connection import addresses
 from robomesh.contract.keys import robot_key
 from robomesh.listen_address import own_addresses, split_address
 from robomesh.service import service
+from robomesh.texts import split_commas
 from robomesh.wire.session import SessionSettings, open_session
 from services.command_line import main
 from services.command_line.service_settings.metrics_ports import (
@@ -228,7 +228,7 @@ def _check_ports_free(site: Site) -> None:
 async def _until_page_shows_robots(site: Site, endpoint: str) -> None:
     """Wait until the console serves, every robot is described, and the simulated robots publish frames."""
     async with open_session(
-        SessionSettings(connect=addresses(endpoint), tls=site.tls_of("console"))
+        SessionSettings(connect=split_commas(endpoint), tls=site.tls_of("console"))
     ) as session:
         for robot in site.robot:
             topic = "frames" if robot.simulated else "description"

@@ -1,0 +1,11 @@
+"""State that a restart takes from an audit log."""
+
+from collections.abc import Iterable
+from functools import reduce
+
+from protocol_gateway.audit.persisted_state import EMPTY, PersistedState, apply_entry
+from protocol_gateway.authority.audit_entry import Entry
+
+
+def state_after(entries: Iterable[Entry]) -> PersistedState:
+    return reduce(apply_entry, entries, EMPTY)
