@@ -34,7 +34,7 @@ from robots.descriptions.description import known_names, load
 from robots.kinematics.inverse import InverseSolver, Task, build_solver, solve
 from robots.kinematics.joints import FloatArray, violations
 from robots.kinematics.model import RobotModel, all_positions, build_model, tool_jacobian, tool_placement
-from robots.kinematics.singularity import reach_of
+from robots.kinematics.singularity import arm_length
 from robots.schema.poses import inverse
 from services.kinematics.cell_state import CellState
 from services.kinematics.states import FramesMessage, add_proximity, kinematic_state
@@ -284,7 +284,7 @@ def messages() -> dict[str, float]:
     apart[1, 3] = 0.9
     arms = CellRobot("arm", "pt600", np.eye(4)), CellRobot("other", "pt600", apart)
     cell, description, now = build_cell(CellDescription(arms, around())), load("pt600"), Timestamp(seconds=1)
-    model, reach = build_model(description), reach_of(description)
+    model, reach = build_model(description), arm_length(description)
     state = CellState({"arm": np.inf, "other": np.inf}, time.monotonic)
     state.update("other", model.joints.home)
     frames = FramesMessage(model, prefix="bench/arm", base_to_site=np.eye(4))

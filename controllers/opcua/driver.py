@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from controllers.opcua import signals
-from controllers.opcua.facts import Found, Reading, Value, decode
+from controllers.opcua.facts import ItemsFound, Reading, Value, decode
 from controllers.opcua.joints import (
     LEAST_SPREAD_S,
     Joiner,
@@ -141,7 +141,7 @@ class OpcUaDriver(OnlyReads):
 
     def _events(self, line: bytes, now_s: float) -> list[ControllerEvent]:
         fact = decode(line)
-        if isinstance(fact, Found):
+        if isinstance(fact, ItemsFound):
             return self._on_found(fact)
         if self._state is None:
             raise ValueError("values before the list of items")
@@ -160,7 +160,7 @@ class OpcUaDriver(OnlyReads):
             events.append(SoftwareReceived(software))
         return events
 
-    def _on_found(self, found: Found) -> list[ControllerEvent]:
+    def _on_found(self, found: ItemsFound) -> list[ControllerEvent]:
         if self._state is not None:
             raise ValueError("a second list of items")
         self._state = _State(found, self._settings, self._joint_types)
@@ -197,7 +197,7 @@ class _State:
         new_software: Version of the controller's software, if the last notification had it; empty otherwise.
     """
 
-    def __init__(self, found: Found, settings: OpcUaSettings, joint_types: Sequence[JointType]) -> None:
+    def __init__(self, found: ItemsFound, settings: OpcUaSettings, joint_types: Sequence[JointType]) -> None:
         self._items = found.items
         self._numbers: dict[str, list[int]] = {}
         for number, item in enumerate(found.items):

@@ -55,7 +55,7 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ItemsFound:
     """List of the items that are read.
 
     Attributes:
@@ -95,13 +95,13 @@ class Values:
     readings: tuple[Reading, ...] = ()
 
 
-Fact: TypeAlias = Found | Values
+Fact: TypeAlias = ItemsFound | Values
 
 
 def encode(fact: Fact) -> bytes:
     """Return a fact as a line."""
     match fact:
-        case Found(items, server, sampling_s):
+        case ItemsFound(items, server, sampling_s):
             listed = [[i.kind, i.name, i.unit.number, i.unit.text, i.profile] for i in items]
             data: dict[str, Any] = {"found": listed, "server": server, "sampling_s": sampling_s}
         case Values(()):
@@ -125,7 +125,7 @@ def decode(line: bytes) -> Fact:
         case {"found": list(listed), "server": str(server), "sampling_s": int() | float() as seconds}:
             if len(data) != 3 or len(listed) > MOST_ITEMS or not _is_number(seconds):
                 raise ValueError("too many items, or not the keys of a list of items")
-            return Found(tuple(map(_item, listed)), _text(server), float(seconds))
+            return ItemsFound(tuple(map(_item, listed)), _text(server), float(seconds))
         case {"alive": True} if len(data) == 1:
             return Values()
         case {"values": list(listed)} if len(data) == 1 and 0 < len(listed) <= MOST_ITEMS:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from controllers.opcua.facts import POSITION, SPEED, Found, Item, Reading, order_of
+from controllers.opcua.facts import POSITION, SPEED, Item, ItemsFound, Reading, order_of
 from controllers.opcua.settings import OpcUaJoint
 from controllers.opcua.units import BY_NUMBER, Unit, number_of, scale_of
 from protocol_gateway.seam.errors import GatewaySettingsError
@@ -68,7 +68,7 @@ def check_declared(joints: Sequence[OpcUaJoint], joint_types: Sequence[JointType
 
 
 def axes_of(
-    found: Found, declared: Sequence[OpcUaJoint], joint_types: Sequence[JointType]
+    found: ItemsFound, declared: Sequence[OpcUaJoint], joint_types: Sequence[JointType]
 ) -> tuple[Axis, ...]:
     """Return the axis of each joint.
 

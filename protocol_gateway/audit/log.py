@@ -35,7 +35,7 @@ from protocol_gateway.audit.persisted_state import (
     to_values,
     with_latched_stop,
 )
-from protocol_gateway.audit.recovery import Recovery, find_end
+from protocol_gateway.audit.recovery import RecoveredLog, find_end
 from protocol_gateway.authority.audit_entry import GATEWAY, Entry, Outcome, chain_entry
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
@@ -171,7 +171,7 @@ class AuditLog:
         self._disk.shutdown()
         os.close(self._file)
 
-    def _remember_stops(self, recovery: Recovery) -> None:
+    def _remember_stops(self, recovery: RecoveredLog) -> None:
         """Restore the latched stop from log and latch file; latch a new one if a stop may be lost."""
         state, stop, unsent = merge(recovery.end.state, self.latch.found)
         self.damage = ", and ".join(filter(None, (recovery.problem, self.latch.damage)))

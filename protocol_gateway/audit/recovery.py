@@ -41,7 +41,7 @@ class LogEnd:
     state: PersistedState = EMPTY
 
 
-class Recovery(NamedTuple):
+class RecoveredLog(NamedTuple):
     """Result of the recovery.
 
     Attributes:
@@ -62,7 +62,7 @@ class _Scan(NamedTuple):
     damage: str
 
 
-def find_end(live: Path) -> Recovery:
+def find_end(live: Path) -> RecoveredLog:
     """Find the end of the live file; if it is damaged, use the last number of the older parts."""
     end, torn, damage = _scan(live)
     parts = older_parts(live)
@@ -76,7 +76,7 @@ def find_end(live: Path) -> Recovery:
     if torn:
         problem = f"a torn last line was cut off after entry {end.number}{damage and ', and '}{damage}"
     unknown = bool(torn) and (_REQUEST.search(torn) is None or may_change_stop(torn))
-    return Recovery(end, problem, bool(damage) or unknown, bool(damage))
+    return RecoveredLog(end, problem, bool(damage) or unknown, bool(damage))
 
 
 def _continued_after(end: LogEnd, newest: Path) -> LogEnd:

@@ -14,7 +14,7 @@ from protocol_gateway.authority.audit_entry import MESH
 from protocol_gateway.authority.decisions import PlannedProgram, Snapshot
 from protocol_gateway.authority.events import CommandsRequested
 from protocol_gateway.authority.lease_rules import MOTION_COMMANDS, Answer, Authority, Now, holds, not_sent
-from protocol_gateway.authority.preconditions import ControllerState, obstacle, predicted
+from protocol_gateway.authority.preconditions import ControllerState, predicted, refusal_now
 from protocol_gateway.seam import Activity
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
@@ -118,7 +118,7 @@ def controller_refusal(
     if just_reset and status.activity in (Activity.STOPPED, Activity.FAULT):
         # The controller still reports the stop that was just reset. If it is stopped, it refuses itself.
         controller = replace(controller, status=replace(status, activity=None))
-    return obstacle(request, controller, joints)
+    return refusal_now(request, controller, joints)
 
 
 def refusal_meanwhile(

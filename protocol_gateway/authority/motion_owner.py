@@ -33,7 +33,7 @@ _APART = 0.01
 _C = CommandRequest.Command
 
 
-def command_sent(
+def record_command(
     authority: Authority,
     request: CommandRequest,
     now: Now,
@@ -102,13 +102,13 @@ def _appended(
     return both if len(both) <= MOST_WAYPOINTS else ()
 
 
-def given_up(authority: Authority) -> Authority:
+def drop_held(authority: Authority) -> Authority:
     """Drop a motion that was on hold at rest, after its RESET."""
     lease = authority.lease
     return authority if lease is None else replace(authority, lease=replace(lease, motion=None))
 
 
-def refused(authority: Authority) -> Authority:
+def drop_refused(authority: Authority) -> Authority:
     """Drop a motion that has not begun, if the controller's refusal can only be for it."""
     lease = authority.lease
     if lease is None or lease.motion is None or authority.moving:
@@ -118,7 +118,7 @@ def refused(authority: Authority) -> Authority:
     return replace(authority, lease=replace(lease, motion=None))
 
 
-def reported(authority: Authority, *, resting: bool, dated_s: float) -> Authority:
+def follow_status(authority: Authority, *, resting: bool, dated_s: float) -> Authority:
     """Follow one status unit of the controller.
 
     Args:
@@ -136,7 +136,7 @@ def reported(authority: Authority, *, resting: bool, dated_s: float) -> Authorit
     return replace(authority, lease=replace(lease, motion=replace(motion, rests=rests)))
 
 
-def observe(
+def follow_motion(
     authority: Authority, *, moving: bool, pending: bool, arrived: bool, now: Now
 ) -> tuple[Authority, bool]:
     """Follow the robot's motion.

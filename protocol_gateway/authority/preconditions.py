@@ -114,7 +114,7 @@ class ControllerState:
     recover: frozenset[Recovery] = frozenset()
 
 
-def obstacle(request: CommandRequest, controller: ControllerState, joints: Joints) -> Answer | None:
+def refusal_now(request: CommandRequest, controller: ControllerState, joints: Joints) -> Answer | None:
     """Return the refusal of a command that cannot be sent now; None: it can."""
     found = (
         _link_obstacle(controller)

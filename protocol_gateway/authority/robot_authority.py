@@ -145,13 +145,13 @@ class RobotAuthority:
                 self._authority = replace(self._authority, reset_s=None)
             case events.StatusReported():
                 resting = event.activity is Activity.IDLE and self._has_arrived(seen.controller)
-                self._authority = motion_owner.reported(
+                self._authority = motion_owner.follow_status(
                     self._authority, resting=resting, dated_s=event.dated_s
                 )
             case events.UnitRefused():
                 # The refused unit is unknown, and may have been the speed.
                 before = replace(self._authority, speed_percent=None)
-                self._authority = motion_owner.refused(before)
+                self._authority = motion_owner.drop_refused(before)
                 if before is not self._authority:
                     yield decisions.PublishState()
             case events.MotionObserved():
@@ -167,7 +167,7 @@ class RobotAuthority:
             return None
         return None if stop_rules.in_transit_since(authority, now) is None else last[2]
 
-    def obstacle(self, request: CommandRequest, seen: Snapshot) -> Answer | None:
+    def refusal_now(self, request: CommandRequest, seen: Snapshot) -> Answer | None:
         """Return the refusal of a command by the controller's present state; None: allowed."""
         return evaluation.controller_refusal(request, self._authority, seen.controller, seen, self._joints)
 
@@ -190,15 +190,15 @@ class RobotAuthority:
         ):
             result = repeated
             if sent_s is None:
-                self._authority = stop_rules.stop_sent(self._authority, result.id, seen.now.monotonic_s)
+                self._authority = stop_rules.mark_sent(self._authority, result.id, seen.now.monotonic_s)
         else:
             number = yield decisions.NumberStop(self._authority.last_stop_id)
-            self._authority, latched = stop_rules.stop(
+            self._authority, latched = stop_rules.latch_stop(
                 self._authority, by=stop.by, reason=stop.reason, now=seen.now, number=number
             )
             if problem is None:
                 result = StopResult(codes.STOP_SENT(id=latched.id), latched.id, sent=True)
-                self._authority = stop_rules.stop_sent(
+                self._authority = stop_rules.mark_sent(
                     self._authority, latched.id, sent_s or seen.now.monotonic_s
                 )
             else:
@@ -228,7 +228,7 @@ class RobotAuthority:
         latched = self._authority.stop
         if latched is None or seen.controller.read_only or (yield from self._send_stop_unit()) is not None:
             return
-        self._authority = stop_rules.stop_sent(self._authority, latched.id, seen.now.monotonic_s, first=True)
+        self._authority = stop_rules.mark_sent(self._authority, latched.id, seen.now.monotonic_s, first=True)
         yield decisions.PublishState()
         result = StopResult(codes.STOP_SENT_AGAIN(id=latched.id), latched.id, sent=True)
         yield published_events.stop_sent(result)
@@ -410,7 +410,7 @@ class RobotAuthority:
             return f"{command.names}: the program was not started, and nothing is on hold"
         for request in command.requests:
             latched, target = self._authority.stop, target_of(request, controller, self._joints)
-            self._authority = motion_owner.command_sent(
+            self._authority = motion_owner.record_command(
                 self._authority,
                 request,
                 seen.now,
@@ -482,7 +482,7 @@ class RobotAuthority:
         if not requests or (yield from self._send_for_jog(requests, seen)) is not None:
             return
         if requests[0].command == _C.RESET:
-            self._authority = motion_owner.given_up(self._authority)
+            self._authority = motion_owner.drop_held(self._authority)
 
     def _send_for_jog(self, requests: Sequence[CommandRequest], seen: Snapshot) -> Decisions[Reason | None]:
         """Send commands of a jog as one unit, and apply them; return why they were not sent."""
@@ -496,7 +496,7 @@ class RobotAuthority:
         self._last_unit_s = seen.now.monotonic_s
         for request in requests:
             target = target_of(request, seen.controller, self._joints)
-            self._authority = motion_owner.command_sent(
+            self._authority = motion_owner.record_command(
                 self._authority,
                 request,
                 seen.now,
@@ -537,7 +537,7 @@ class RobotAuthority:
         if orphaned_by and moving and self._authority.lease is None:
             yield from self._stop_by_gateway(codes.STOP_GATEWAY_KILLED(holder=orphaned_by), seen)
         before = self._authority
-        self._authority, uncommanded = motion_owner.observe(
+        self._authority, uncommanded = motion_owner.follow_motion(
             before,
             moving=moving,
             pending=motion_may_be_held(seen.controller.status.activity),

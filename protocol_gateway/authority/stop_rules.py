@@ -9,7 +9,7 @@ from robomesh.reasons import Reason
 IN_TRANSIT_S = 0.1
 
 
-def stop(
+def latch_stop(
     authority: Authority, *, by: str, reason: str | Reason, now: Now, number: int | None = None
 ) -> tuple[Authority, LatchedStop]:
     """Latch a stop under a new number, and drop the motion that it ends.
@@ -31,7 +31,7 @@ def stop(
     return replace(authority, stop=latched, last_stop_id=number, lease=lease), latched
 
 
-def stop_sent(authority: Authority, stop_id: int, sent_s: float, *, first: bool = False) -> Authority:
+def mark_sent(authority: Authority, stop_id: int, sent_s: float, *, first: bool = False) -> Authority:
     """Record the monotonic time at which a stop's unit was put on the controller's socket.
 
     Args:

@@ -81,7 +81,7 @@ class Checker:
         """Return why motions of a robot cannot be checked now; None: they can."""
         return self._problems[robot]
 
-    def starting(self, robot: str) -> bool:
+    def is_starting(self, robot: str) -> bool:
         """Return whether the check is starting, in contrast to a failure."""
         return self._problems[robot] == _STARTING
 

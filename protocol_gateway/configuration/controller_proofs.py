@@ -72,7 +72,7 @@ class ControllerProofs:
             else ""
         )
 
-    def joints_unproven(self, software: str) -> Reason | None:
+    def why_joints_unproven(self, software: str) -> Reason | None:
         """Return why the joints that the controller sends may not be those of the model; None: they are.
 
         Args:
@@ -94,11 +94,11 @@ class ControllerProofs:
             return codes.JOINTS_OTHER_SOFTWARE(before=before, now=now)
         return None
 
-    def read_only(self, software: str) -> Reason | None:
+    def why_read_only(self, software: str) -> Reason | None:
         """Return why no command may be sent to the controller; None: commands may be sent.
 
         Args:
-            software: See `joints_unproven`.
+            software: See `why_joints_unproven`.
         """
         capabilities, proof = self._capabilities, self._stop
         if not capabilities.commands:
@@ -124,11 +124,11 @@ class ControllerProofs:
             return codes.STOP_OTHER_SOFTWARE(before=proof.software, now=software)
         return None
 
-    def software_unknown(self, software: str) -> Reason | None:
+    def why_software_unknown(self, software: str) -> Reason | None:
         """Return why no motion may be sent: the stop was proven with a version that is not confirmed yet.
 
         Args:
-            software: See `joints_unproven`.
+            software: See `why_joints_unproven`.
         """
         proof = self._stop
         if software or self._simulated or not isinstance(proof, StopProof) or not proof.software:

@@ -204,9 +204,9 @@ class Control:
         finally:
             self._preparing.discard(cancelled)
 
-    def obstacle(self, request: schema.CommandRequest) -> Answer | None:
+    def refusal_now(self, request: schema.CommandRequest) -> Answer | None:
         """Return the refusal of a command by the controller's present state; None: allowed."""
-        return self._robot_authority.obstacle(request, self._snapshot())
+        return self._robot_authority.refusal_now(request, self._snapshot())
 
     async def close(self) -> None:
         """End the lease, if there is one, and write pending audit entries."""
@@ -264,7 +264,7 @@ class Control:
             case decisions.Send():
                 return self._send(decision)
             case decisions.Recheck():
-                return None if self._checks is None else self._checks.changed(decision.check_verdict)
+                return None if self._checks is None else self._checks.why_changed(decision.check_verdict)
             case decisions.EnterCell() | decisions.CheckMotion() | decisions.Append():
                 raise TypeError(f"{type(decision).__name__} cannot be performed without waiting")
         try:
@@ -305,7 +305,7 @@ class Control:
             controller=self._performers.controller(),
             latch_problem=self._performers.latch.problem,
             closed=self._performers.other_gateway()
-            or (None if self._checks is None else self._checks.cell_closed),
+            or (None if self._checks is None else self._checks.why_cell_closed),
         )
 
     def _send(self, decision: decisions.Send) -> Reason | None:

@@ -29,7 +29,7 @@ class CommandArrivals:
         self._ran_s = inf
         self._held_up_s = self._delivered_s = -inf
 
-    def runs(self, now_s: float) -> None:
+    def note_running(self, now_s: float) -> None:
         """Note that the gateway runs; call it repeatedly."""
         if now_s - self._ran_s > LONGEST_WAIT_S:
             self._held_up_s, self._delivered_s = self._ran_s, now_s + _DELIVERED_S
@@ -38,7 +38,7 @@ class CommandArrivals:
     def arrived_s(self, now_s: float) -> float:
         """Return the earliest time at which a command that is received now may have arrived."""
         if self._ran_s < inf:
-            self.runs(now_s)
+            self.note_running(now_s)
         return self._held_up_s if now_s < self._delivered_s else now_s
 
 

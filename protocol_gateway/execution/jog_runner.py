@@ -152,7 +152,7 @@ class JogRunner:
             refused = None if admission.answer.accepted else admission.answer
         elif self._preparing is not None or self._run is not None:
             refused = not_sent(codes.JOG_RUNS())
-        elif (problem := self._control.obstacle(request)) is not None:
+        elif (problem := self._control.refusal_now(request)) is not None:
             refused = problem
         else:
             try:
@@ -373,8 +373,8 @@ class JogRunner:
         if why is None and program is not None and program.ending is not None:
             why = program.ending
         if why is None:
-            obstacle = self._control.obstacle(schema.CommandRequest(command=_C.JOG))
-            why = None if obstacle is None else obstacle.reason
+            refusal = self._control.refusal_now(schema.CommandRequest(command=_C.JOG))
+            why = None if refusal is None else refusal.reason
         if why is None and time.monotonic() - run.progress_s > _START_TIMEOUT_S:
             why = None if self._rests_at_last(run) else codes.JOG_NOT_MOVING()
         return why

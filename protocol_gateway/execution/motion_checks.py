@@ -78,7 +78,7 @@ class MotionChecks:
         cell_occupancy.add(name, self.occupancy)
 
     @property
-    def cell_closed(self) -> Reason | None:
+    def why_cell_closed(self) -> Reason | None:
         """Reason why no robot of the cell may be controlled or moved now; None: they may."""
         return self._cell_occupancy.closed
 
@@ -90,9 +90,9 @@ class MotionChecks:
         return self._checker.problem(self._name) or self._controller().set_up
 
     @property
-    def starting(self) -> bool:
+    def is_starting(self) -> bool:
         """True if motions cannot be checked only because the check is starting."""
-        return self.policy is not Policy.OFF and self._checker.starting(self._name)
+        return self.policy is not Policy.OFF and self._checker.is_starting(self._name)
 
     def motion_lock(self, requests: Sequence[CommandRequest]) -> AbstractAsyncContextManager[None]:
         """Return the cell's motion lock for commands that move the robot, otherwise a null context."""
@@ -197,7 +197,7 @@ class MotionChecks:
             return Occupancy(unknown=codes.OTHER_MOVES())
         return Occupancy(path=(controller.positions, *ahead))
 
-    def changed(self, check_verdict: CheckVerdict) -> Reason | None:
+    def why_changed(self, check_verdict: CheckVerdict) -> Reason | None:
         """Return the reason if the cell has changed since a motion was checked; None: unchanged."""
         if check_verdict.start and not self.is_resting_at(check_verdict.start):
             return codes.ROBOT_MOVED()

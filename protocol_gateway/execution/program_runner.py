@@ -218,7 +218,7 @@ class ProgramRunner:
             return _Prepared(check_verdict.refusal)
         first = next((step for step in checked.steps if step.target is not None), None)
         # Refuse now if the present state (not homed, on hold) would refuse the first step.
-        if first is not None and (problem := self._control.obstacle(_request(first, ""))) is not None:
+        if first is not None and (problem := self._control.refusal_now(_request(first, ""))) is not None:
             return _Prepared(problem)
         name = one_line(request.program_name, LONGEST_TEXT).strip() or "unnamed"
         if check_verdict.warning is not None:

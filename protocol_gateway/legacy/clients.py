@@ -102,7 +102,7 @@ class LegacyClients:
         """
         if answer:
             for client, commander in self._clients.items():
-                if commander is not None and commander.in_control:
+                if commander is not None and commander.holds_lease:
                     client.answer(unit)
         elif self._clients:
             if not self._units:

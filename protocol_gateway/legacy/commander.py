@@ -63,14 +63,14 @@ class Commander:
         self._end_reason: Reason | None = None
 
     @property
-    def in_control(self) -> bool:
+    def holds_lease(self) -> bool:
         """True if the program holds the lease."""
         return holds(self._control.authority, self.operator, self._secret)
 
     def renew(self) -> None:
         """Renew the program's lease, if it has one, because a unit was received."""
         now_s = time.monotonic()
-        if self.in_control and now_s - self._renewed_s >= _RENEW_S:
+        if self.holds_lease and now_s - self._renewed_s >= _RENEW_S:
             self._renewed_s = now_s
             self._renewal = asyncio.create_task(self._renew())
 
@@ -87,7 +87,7 @@ class Commander:
         """End the lease and drop queued units, because the connection has ended."""
         self._end_reason = why
         self._waiting.clear()
-        if self.in_control:
+        if self.holds_lease:
             self._control.handle(LeaseEnded(why))
 
     async def settle(self) -> None:
@@ -126,7 +126,7 @@ class Commander:
 
     async def _do(self, unit: Unit, requests: Sequence[CommandRequest]) -> None:
         try:
-            if not self.in_control:
+            if not self.holds_lease:
                 await self._lease(_A.ACQUIRE)
         except RefusedError as error:
             self._refuse(unit, Error(READ_ONLY, str(error)), True)

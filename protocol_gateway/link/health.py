@@ -61,7 +61,7 @@ class Arrivals:
         return spans_s[(len(spans_s) - 1) * 99 // 100] - spans_s[len(spans_s) // 2]
 
 
-class Questions:
+class AnswerTimes:
     """Times between questions and their answers, of a controller that is asked for its state.
 
     The state is of some moment between the two, so the middle is wrong by at most half of it.

@@ -25,7 +25,7 @@ from operator import attrgetter
 from protocol_gateway.link.channel import KeptChannel
 from protocol_gateway.link.connection import READ_BYTES
 from protocol_gateway.link.flood import EventDispatcher, FloodDetector
-from protocol_gateway.link.health import Arrivals, LinkHealth, LossCounter, Questions, ResponseTimer
+from protocol_gateway.link.health import AnswerTimes, Arrivals, LinkHealth, LossCounter, ResponseTimer
 from protocol_gateway.link.plausibility import Plausibility
 from protocol_gateway.link.status import LinkState, LinkStatus
 from protocol_gateway.link.timers import Timers
@@ -170,7 +170,7 @@ class ControllerLink:
         self._arrivals = Arrivals()
         self._losses = LossCounter()
         self._response_timer = ResponseTimer()
-        self._questions = Questions()
+        self._questions = AnswerTimes()
         self._unanswered = 0
         self._dispatcher = EventDispatcher(on_event, self._later)
         self._send_failed = asyncio.Event()

@@ -91,7 +91,7 @@ class Robot:
         self._settings, self._capabilities = settings, driver.capabilities
         self._session, self._site = session, site
         self._proofs = make_proofs(site, settings, description, driver)
-        self._read_only = self._proofs.read_only("")
+        self._read_only = self._proofs.why_read_only("")
         self._reported_unproven: Reason | None = None
         self._missing_channels: set[str] = set()
         # Ids of other gateways that serve this robot.
@@ -339,7 +339,7 @@ class Robot:
     async def _poll(self) -> None:
         next_s = 0.0
         while True:
-            self._control.arrivals.runs(time.monotonic())
+            self._control.arrivals.note_running(time.monotonic())
             await asyncio.sleep(_POLL_S)
             self._control.handle(events.TimePassed())
             now_s = time.monotonic()
@@ -414,7 +414,7 @@ class Robot:
     def _on_controller_status(self) -> None:
         before, self._read_only = (
             self._read_only,
-            self._proofs.read_only(self._telemetry.software)
+            self._proofs.why_read_only(self._telemetry.software)
             or self._telemetry.undeclared_axes
             or self._telemetry.motion_impossible,
         )
@@ -429,7 +429,7 @@ class Robot:
         self._publish_state()
 
     def _joints_unproven(self) -> Reason | None:
-        return self._telemetry.undeclared_axes or self._proofs.joints_unproven(self._telemetry.software)
+        return self._telemetry.undeclared_axes or self._proofs.why_joints_unproven(self._telemetry.software)
 
     def _tolerates(self, why: Reason) -> bool:
         """Publish positions of unproven joints that cannot be, marked: their comparison shows the reason."""
@@ -474,11 +474,11 @@ class Robot:
             status=self._telemetry.status(now_s),
             fault=self._telemetry.fault(now_s),
             positions=self._telemetry.positions(now_s) if unproven is None else None,
-            positions_stale=self._capabilities.no_joints or self._telemetry.positions_stale(now_s),
+            positions_stale=self._capabilities.no_joints or self._telemetry.why_stale(now_s),
             unproven=unproven,
-            invalid=self._telemetry.invalid(now_s),
+            invalid=self._telemetry.why_invalid(now_s),
             software=software,
-            software_unknown=self._proofs.software_unknown(software),
+            software_unknown=self._proofs.why_software_unknown(software),
             reports_set_up=self._signals.has_set_up,
             set_up=codes.CHECK_TOOL_CHANGED(changes=", ".join(changes)) if changes else None,
             read_only=self._read_only,
@@ -507,7 +507,7 @@ class Robot:
                 legacy_clients=None if self._legacy is None else self._legacy.counts,
                 policy=self._checks.policy,
                 unchecked=self._checks.problem,
-                check_starting=self._checks.starting,
+                check_starting=self._checks.is_starting,
                 program=self._programs.running,
                 jog=self._jogs.running,
                 joints_sha256=self._proofs.joints_sha256,

@@ -147,12 +147,12 @@ class Telemetry:
 
     def mark_invalid(self, why: Reason, now_s: float) -> None:
         """Note that positions cannot be the arm's, although they are published."""
-        first = self.invalid(now_s)
+        first = self.why_invalid(now_s)
         self._invalid = first or codes.JOINTS_INVALID(why), now_s
         if first is None:
             self._on_status()
 
-    def invalid(self, now_s: float) -> Reason | None:
+    def why_invalid(self, now_s: float) -> Reason | None:
         """Return why newly published positions cannot be the arm's; None: they can."""
         if self._invalid is None or now_s - self._invalid[1] >= self._stale_after_s:
             return None
@@ -160,9 +160,9 @@ class Telemetry:
 
     def positions(self, now_s: float) -> tuple[float, ...] | None:
         """Return the newest positions [rad] or [m]; None: none since the link came up, or stale."""
-        return None if self._positions is None or self.positions_stale(now_s) else self._positions[0]
+        return None if self._positions is None or self.why_stale(now_s) else self._positions[0]
 
-    def positions_stale(self, now_s: float) -> Reason | None:
+    def why_stale(self, now_s: float) -> Reason | None:
         """Return the reason if the positions are stale; None: they are current, or none were received."""
         if self._positions is None or now_s - self._positions[1] < self._stale_after_s:
             return None
@@ -188,14 +188,14 @@ class Telemetry:
         self._signals.publish_due(now_s)
         before, self._lost = (
             self._lost,
-            (bool(self.positions_stale(now_s)), self._status_watchdog.expired(now_s)),
+            (bool(self.why_stale(now_s)), self._status_watchdog.expired(now_s)),
         )
         positions, status = self._lost
         if positions and not before[0]:
             self.motion_detector.forget()
         news = self._joints_notice.update(now_s, holds=positions)
         if news is True:
-            text = f"{self.positions_stale(now_s)}: the robot's position is unknown, motion is refused"
+            text = f"{self.why_stale(now_s)}: the robot's position is unknown, motion is refused"
             self._journal.report(_S.WARNING, "joints.gone", text)
         elif news is False:
             self._journal.report(_S.INFO, "joints.back", "joint positions are received again")

@@ -15,7 +15,7 @@ from robots.bodies.pair_study import (
     SURVEYED,
     TIME_LIMIT_S,
     Case,
-    Found,
+    Finding,
     study_results,
 )
 from robots.bodies.sampling import SAMPLES, allowed_positions
@@ -133,7 +133,7 @@ class _Preparation:
     plan: PairPlan
     numbers: tuple[int, ...] = ()
     case: Case | None = None
-    refined: dict[tuple[Found, ...], PairPlan] = field(default_factory=dict)
+    refined: dict[tuple[Finding, ...], PairPlan] = field(default_factory=dict)
 
 
 @lru_cache(maxsize=8)
@@ -214,7 +214,7 @@ def _case(
     )
 
 
-def _refine(start: _Preparation, found: tuple[Found, ...]) -> PairPlan:
+def _refine(start: _Preparation, found: tuple[Finding, ...]) -> PairPlan:
     """Return the plan with the results of its study."""
     assert start.case is not None
     case, bodies, verdicts, pairs = start.case, list(start.plan.bodies), [], []
@@ -232,7 +232,7 @@ def _refine(start: _Preparation, found: tuple[Found, ...]) -> PairPlan:
             verdicts.append(verdict)
             continue
         number, (one, other, measured) = next(checked)
-        kind, share = results.get(number, Found(Kind.APART))
+        kind, share = results.get(number, Finding(Kind.APART))
         values = _VALUES.get(kind, {})
         if kind in ELSEWHERE:
             values = {"percent": round(100 * share), **values}

@@ -72,14 +72,14 @@ class Case:
     touching: tuple[IndexArray, ...]
 
 
-class Found(NamedTuple):
+class Finding(NamedTuple):
     """A study's result for a pair: its kind, and the share of positions for the kind's text."""
 
     kind: Kind
     share: float = 0.0
 
 
-def study_results(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
+def study_results(case: Case, *, wait: bool = True) -> tuple[Finding, ...] | None:
     """Return the result for each pair of a case, from the cache or from a new study.
 
     Args:
@@ -111,7 +111,7 @@ def study_results(case: Case, *, wait: bool = True) -> tuple[Found, ...] | None:
     if not wait and failures < _TRIES:
         return None
     # The hulls of a pair that is apart at home are checked anyway.
-    return tuple(Found(Kind.APART if len(each) else Kind.NOT_STUDIED) for each in case.touching)
+    return tuple(Finding(Kind.APART if len(each) else Kind.NOT_STUDIED) for each in case.touching)
 
 
 def _record_outcome(path: Path, *, failed: bool) -> None:
@@ -161,11 +161,11 @@ _running: dict[Path, _Study] = {}
 _failed: dict[Path, tuple[int, float]] = {}
 
 
-def study(case: Case) -> tuple[Found, ...]:
+def study(case: Case) -> tuple[Finding, ...]:
     """Study each pair of a case, first those with hulls that touch at home."""
     touch = Touch()
     checked, drawn = ([Surface(each) for each in some] for some in (case.checked, case.drawn))
-    found: dict[int, Found] = {}
+    found: dict[int, Finding] = {}
     for number in sorted(range(len(case.pairs)), key=lambda number: len(case.touching[number]) > 0):
         one, other = case.pairs[number]
         touching = case.touching[number]
@@ -175,7 +175,7 @@ def study(case: Case) -> tuple[Found, ...]:
             found[number] = _apart_at_home(places, checked[one], checked[other], touch)
         else:
             levels = [(some[one], some[other]) for some in (checked, drawn)]
-            found[number] = Found(_touching_at_home(places, levels, touch))
+            found[number] = Finding(_touching_at_home(places, levels, touch))
     return tuple(found[number] for number in range(len(case.pairs)))
 
 
@@ -197,7 +197,7 @@ def _touching_at_home(places: FloatArray, levels: Sequence[tuple[Surface, Surfac
     return Kind.TOUCHING
 
 
-def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touch) -> Found:
+def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touch) -> Finding:
     """Decide how to check a pair that is apart at home.
 
     Visual surfaces do not count: the author of the collision geometry may have enlarged it on purpose.
@@ -207,20 +207,20 @@ def _apart_at_home(places: FloatArray, one: Surface, other: Surface, touch: Touc
     """
     triangles = len(one.triangles), len(other.triangles)
     if not all(triangles):
-        return Found(Kind.APART)
+        return Finding(Kind.APART)
     if sum(triangles) > MOST_TRIANGLES:
-        return Found(Kind.TOO_LARGE, len(places) / SURVEYED)
+        return Finding(Kind.TOO_LARGE, len(places) / SURVEYED)
     false = 0
     for place in places:
         if time.process_time() > _SURVEY_ENDS * TIME_LIMIT_S:
-            return Found(Kind.APART)
-        if touch.surfaces(one, other, place):
+            return Finding(Kind.APART)
+        if touch.surfaces_touch(one, other, place):
             continue
-        if touch.inside(one, other, place):
+        if touch.is_inside(one, other, place):
             # A check of the surfaces would miss this contact.
-            return Found(Kind.APART)
+            return Finding(Kind.APART)
         false += 1
-    return Found(Kind.FALSE_CONTACTS, false / SURVEYED) if false >= FEWEST_FALSE else Found(Kind.APART)
+    return Finding(Kind.FALSE_CONTACTS, false / SURVEYED) if false >= FEWEST_FALSE else Finding(Kind.APART)
 
 
 def _key(case: Case) -> str:
@@ -252,14 +252,14 @@ def _decode_case(data: bytes) -> Case:
         return Case(pairs, checked, drawn, arrays["placements"], touching)
 
 
-def _encode_results(found: Sequence[Found]) -> bytes:
+def _encode_results(found: Sequence[Finding]) -> bytes:
     return json.dumps(found).encode()
 
 
-def _cached_results(path: Path, case: Case) -> tuple[Found, ...] | None:
+def _cached_results(path: Path, case: Case) -> tuple[Finding, ...] | None:
     """Read the result of an earlier study; None if there is none or the file is damaged."""
     try:
-        found = tuple(Found(Kind(kind), float(share)) for kind, share in json.loads(path.read_bytes()))
+        found = tuple(Finding(Kind(kind), float(share)) for kind, share in json.loads(path.read_bytes()))
     except (OSError, ValueError, TypeError):
         return None
     return found if len(found) == len(case.pairs) else None

@@ -63,15 +63,15 @@ class Touch:
         Args:
             other_to_one: (4, 4) placement of the second in the first's frame.
         """
-        return self.surfaces(one, other, other_to_one) or self.inside(one, other, other_to_one)
+        return self.surfaces_touch(one, other, other_to_one) or self.is_inside(one, other, other_to_one)
 
-    def surfaces(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
+    def surfaces_touch(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
         """Return whether their triangles touch."""
         self._result.clear()
         there = transform(other_to_one)
         return bool(coal.collide(one.exact, _HERE, other.exact, there, self._request, self._result))
 
-    def inside(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
+    def is_inside(self, one: Surface, other: Surface, other_to_one: FloatArray) -> bool:
         """Return whether a piece of one surface is inside the other; their triangles must not touch."""
         rotation, origin = other_to_one[:3, :3], other_to_one[:3, 3]
         # A piece is completely inside or outside, so one of its corners is enough.

@@ -9,7 +9,7 @@ from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.checks.path import PathSamples
 from robots.checks.segments import Segment, SegmentChecker
-from robots.checks.violations import Runs
+from robots.checks.violations import ViolationCollector
 from robots.collision import Cell, pending, unshaped
 from robots.collision.floor import floor_advice
 from robots.descriptions.cells import FLOOR
@@ -134,7 +134,7 @@ class _Checker:
 
     def __init__(self, joints: Joints) -> None:
         self.time_s = 0.0
-        self.runs = Runs()
+        self.runs = ViolationCollector()
         self.limits: list[Violation] = []
         self.path = PathSamples(len(joints))
         self._joints = joints
@@ -275,7 +275,7 @@ def _floor_notes(cell: Cell, found: Sequence[Violation]) -> tuple[Reason, ...]:
     return (floor_advice(cell.floor, min(heights)),)
 
 
-def _unreported(runs: Runs) -> tuple[Reason, ...]:
+def _unreported(runs: ViolationCollector) -> tuple[Reason, ...]:
     return (codes.CHECK_NOTE_MORE_VIOLATIONS(count=runs.unreported),) if runs.unreported else ()
 
 

@@ -12,7 +12,7 @@ from robots.collision import Arm
 from robots.collision.path import SAMPLE_M
 from robots.kinematics.joints import FloatArray, JointType
 from robots.kinematics.kinematic_tree import Tree, TreeLink, chain_to, position_factors, tool_frame, tree_of
-from robots.kinematics.singularity import reach_of
+from robots.kinematics.singularity import arm_length
 from robots.schema.poses import axis_rotation
 
 
@@ -62,7 +62,7 @@ def _build_chain(arm: Arm) -> ToolChain:
     strokes = _strokes(arm, tree, factors, offsets)
     travel = np.array([_travel(tree, *ball, strokes) for ball in (*balls, (link, tool_to_link[:3, 3], 0.0))])
     return ToolChain(
-        reach_m=reach_of(arm.description),
+        reach_m=arm_length(arm.description),
         travel=travel @ np.abs(factors),
         _placements=np.array([tree.joints[number].joint_to_parent for number in numbers]).reshape(-1, 4, 4),
         _axes=np.array([tree.joints[number].axis for number in numbers]).reshape(-1, 3),

@@ -47,7 +47,7 @@ class _Retreat:
 
 
 @dataclass
-class Runs:
+class ViolationCollector:
     """Violations of a motion, collected sample by sample.
 
     Attributes:

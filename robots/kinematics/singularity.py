@@ -12,7 +12,7 @@ from robots.kinematics.model import RobotModel, tool_jacobian
 from robots.schema.robot_toml import JointType, RobotDescription
 
 
-def reach_of(description: RobotDescription) -> float:
+def arm_length(description: RobotDescription) -> float:
     """Return the length of the stretched arm, from its first joint to its tool [m]; 0 without a joint."""
     tree = tree_of(description)
     on_link, tool_to_link = tool_frame(description)
@@ -39,7 +39,7 @@ def singularity_margin(model: RobotModel, joint_positions: ArrayLike, *, reach: 
 
     Args:
         joint_positions: (n,) [rad] or [m].
-        reach: From `reach_of` [m].
+        reach: From `arm_length` [m].
 
     Raises:
         JointCountError: If there is not one value per joint.

@@ -14,7 +14,7 @@ from robots.descriptions.description import load
 from robots.descriptions.glb import link_glbs, main_colors
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.model import build_model
-from robots.kinematics.singularity import reach_of
+from robots.kinematics.singularity import arm_length
 from services.kinematics.answers import Workers, answer_robot_requests
 from services.kinematics.cell_state import CellState
 from services.kinematics.descriptions import add_surroundings, describe
@@ -130,7 +130,7 @@ async def _serve_robot(
         site=site,
         name=robot.name,
         model=model,
-        reach=reach_of(description),
+        reach=arm_length(description),
         base_to_site=robot.base_to_site,
     )
     arms.add(robot.name, ArmPublisher(session, arm, cell_state, shown))

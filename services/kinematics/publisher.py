@@ -61,7 +61,7 @@ class FollowedArm:
     """An arm and the constants needed to publish its state.
 
     Attributes:
-        reach: Result of `robots.kinematics.singularity.reach_of` [m].
+        reach: Result of `robots.kinematics.singularity.arm_length` [m].
         base_to_site: (4, 4) placement of the base in the site's frame.
     """
 

@@ -128,7 +128,7 @@ def kinematic_state(
     Args:
         positions: (n,) [rad] or [m].
         velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
-        reach: Result of `robots.kinematics.singularity.reach_of` [m].
+        reach: Result of `robots.kinematics.singularity.arm_length` [m].
     """
     joints, jacobian = model.joints, tool_jacobian(model, positions)
     manipulable, margin = dexterity(jacobian, joints.types, reach=reach)

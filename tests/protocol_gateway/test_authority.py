@@ -16,8 +16,8 @@ from protocol_gateway.authority.lease_rules import (
     holds,
     request_lease,
 )
-from protocol_gateway.authority.motion_owner import command_sent, observe, refused
-from protocol_gateway.authority.stop_rules import stop, stop_sent
+from protocol_gateway.authority.motion_owner import drop_refused, follow_motion, record_command
+from protocol_gateway.authority.stop_rules import latch_stop, mark_sent
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 
@@ -43,11 +43,11 @@ def command(kind, number=1, **fields):
 
 
 def moving(time_s=0.0):
-    return command_sent(held(), command(C.MOVE_ABSOLUTE), at(time_s))
+    return record_command(held(), command(C.MOVE_ABSOLUTE), at(time_s))
 
 
 def see(authority, moves, time_s, *, pending=False, arrived=False):
-    return observe(authority, moving=moves, pending=pending, arrived=arrived, now=at(time_s))
+    return follow_motion(authority, moving=moves, pending=pending, arrived=arrived, now=at(time_s))
 
 
 @pytest.mark.parametrize(("asked", "kept"), [(0, 2.0), (0.1, 0.5), (3, 3.0), (60, 5.0), (-1, 0.5)])
@@ -117,7 +117,7 @@ def test_an_offer_passes_the_lease_on_but_not_while_its_holders_motion_runs():
 )
 def test_every_end_of_a_lease_stops_its_holders_motion(end):
     assert end(moving()).stop
-    assert end(command_sent(moving(), command(C.HOLD), at(0.1))).stop
+    assert end(record_command(moving(), command(C.HOLD), at(0.1))).stop
     assert not end(held()).stop
 
 
@@ -155,26 +155,26 @@ def test_very_late_motion_is_stopped_because_it_may_be_the_holders():
 
 
 def test_a_refused_motion_does_not_begin():
-    assert refused(moving()).lease.motion is None
+    assert drop_refused(moving()).lease.motion is None
 
 
 def test_a_refusal_of_something_else_does_not_end_the_holders_motion():
     seen, _ = see(moving(), True, 0.1)
-    later = command_sent(moving(), command(C.SPEED), at(0.1))
+    later = record_command(moving(), command(C.SPEED), at(0.1))
     while_it_moves, _ = see(held(), True, 0.0)
-    while_it_moves = command_sent(while_it_moves, command(C.MOVE_ABSOLUTE), at(0.1))
+    while_it_moves = record_command(while_it_moves, command(C.MOVE_ABSOLUTE), at(0.1))
     for state in (seen, later, while_it_moves):
-        assert refused(state) == state
+        assert drop_refused(state) == state
 
 
 def test_a_resumed_motion_keeps_its_target():
-    state = command_sent(held(), command(C.MOVE_ABSOLUTE), at(0), waypoints=((1.0,),))
-    state = command_sent(state, command(C.HOLD), at(1))
-    assert command_sent(state, command(C.RESUME), at(2)).lease.motion.target == (1.0,)
+    state = record_command(held(), command(C.MOVE_ABSOLUTE), at(0), waypoints=((1.0,),))
+    state = record_command(state, command(C.HOLD), at(1))
+    assert record_command(state, command(C.RESUME), at(2)).lease.motion.target == (1.0,)
 
 
 def test_a_held_motion_stays_the_holders_until_the_controller_reports_none():
-    state = command_sent(moving(), command(C.HOLD), at(0.1))
+    state = record_command(moving(), command(C.HOLD), at(0.1))
     state, _ = see(state, False, 100.0, pending=True)
     assert state.lease.motion is not None
     state, _ = see(state, False, 100.0, pending=False)
@@ -196,23 +196,23 @@ def test_motion_before_the_lease_is_tolerated_until_the_first_command():
     state, _ = see(state, False, 0.1)
     state = ask(state, A.ACQUIRE, secret="s", time_s=5.0).authority
     assert state.lease.tolerates_motion
-    assert command_sent(state, command(C.TRACE_ON), at(6.0)).lease.tolerates_motion
-    assert not command_sent(state, command(C.HOME), at(6.0)).lease.tolerates_motion
+    assert record_command(state, command(C.TRACE_ON), at(6.0)).lease.tolerates_motion
+    assert not record_command(state, command(C.HOME), at(6.0)).lease.tolerates_motion
     late = ask(replace(state, lease=None), A.ACQUIRE, time_s=50.0).authority
     assert not late.lease.tolerates_motion
 
 
 def test_slowing_down_from_a_stop_is_not_uncommanded_motion():
     state, _ = see(moving(), True, 0.1)
-    state, _ = stop(state, by="wang", reason="", now=at(0.2))
+    state, _ = latch_stop(state, by="wang", reason="", now=at(0.2))
     state, uncommanded = see(state, True, 0.25)
     assert not uncommanded
     assert state.uncommanded_s is None
 
 
 def test_motion_seen_just_after_its_stop_is_not_uncommanded():
-    state, latched = stop(moving(), by="li", reason="", now=at(0.1))
-    state, uncommanded = see(stop_sent(state, latched.id, 1000.1), True, 0.2)
+    state, latched = latch_stop(moving(), by="li", reason="", now=at(0.1))
+    state, uncommanded = see(mark_sent(state, latched.id, 1000.1), True, 0.2)
     assert not uncommanded
     state, _ = see(state, False, 0.5)
     _, uncommanded = see(state, True, 2.2)
@@ -220,8 +220,8 @@ def test_motion_seen_just_after_its_stop_is_not_uncommanded():
 
 
 def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():
-    state, first = stop(held(), by="wang", reason="", now=at(0))
-    state, second = stop(state, by="zhao", reason="smoke", now=at(1))
+    state, first = latch_stop(held(), by="wang", reason="", now=at(0))
+    state, second = latch_stop(state, by="zhao", reason="smoke", now=at(1))
     assert (first.id, second.id) == (1, 2)
     for stop_id, words in [
         (1, "RESET names stop 1, but stop 2 is latched (zhao: smoke)"),
@@ -231,20 +231,20 @@ def test_every_stop_has_a_number_and_only_its_own_reset_clears_it():
         assert words in admission.answer.text
     reset = command(C.RESET, stop_id=2)
     assert admit(state, reset, operator="li", now=at(2)).answer.accepted
-    assert command_sent(state, reset, at(2)).stop is None
-    assert stop_sent(state, 1, 1003.0) == state
+    assert record_command(state, reset, at(2)).stop is None
+    assert mark_sent(state, 1, 1003.0) == state
     assert "no stop is" in admit(held(), reset, operator="li", now=at(2)).answer.text
 
 
 @pytest.mark.parametrize("kind", [C.HOME, C.RESUME, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM])
 def test_a_latched_stop_forbids_motion(kind):
-    state, _ = stop(held(), by="wang", reason="", now=at(0))
+    state, _ = latch_stop(held(), by="wang", reason="", now=at(0))
     assert "stop 1 is latched" in admit(state, command(kind), operator="li", now=at(0)).answer.text
 
 
 @pytest.mark.parametrize("kind", [C.HOLD, C.TRACE_ON, C.TRACE_OFF, C.SPEED])
 def test_a_latched_stop_allows_commands_without_motion(kind):
-    state, _ = stop(held(), by="wang", reason="", now=at(0))
+    state, _ = latch_stop(held(), by="wang", reason="", now=at(0))
     assert admit(state, command(kind), operator="li", now=at(0)).answer.accepted
 
 

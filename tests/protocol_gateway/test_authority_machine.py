@@ -16,8 +16,8 @@ from protocol_gateway.authority.lease_rules import (
     holds,
     request_lease,
 )
-from protocol_gateway.authority.motion_owner import command_sent, observe, refused, reported
-from protocol_gateway.authority.stop_rules import stop
+from protocol_gateway.authority.motion_owner import drop_refused, follow_motion, follow_status, record_command
+from protocol_gateway.authority.stop_rules import latch_stop
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
 
@@ -116,7 +116,7 @@ class Machine(RuleBasedStateMachine):
             assert command != C.RESET or request.stop_id == latched.id
         self.sent_under[secret] = number
         self.authority = keep_answer(self.authority, request, Answer(True, ""))
-        self.authority = command_sent(self.authority, request, self.now)
+        self.authority = record_command(self.authority, request, self.now)
         if command in MOTION_COMMANDS or command == C.HOLD:
             self.rests = 0
         assert command not in MOTION_COMMANDS or self.authority.lease.motion is not None
@@ -135,7 +135,7 @@ class Machine(RuleBasedStateMachine):
     @rule()
     def stop(self):
         last = self.authority.last_stop_id
-        self.authority, latched = stop(self.authority, by="anybody", reason="", now=self.now)
+        self.authority, latched = latch_stop(self.authority, by="anybody", reason="", now=self.now)
         assert self.authority.stop is latched
         assert latched.id == last + 1
 
@@ -147,7 +147,7 @@ class Machine(RuleBasedStateMachine):
     @rule(moving=st.booleans(), pending=st.booleans(), arrived=st.booleans())
     def observe(self, moving, pending, arrived):
         commanded = self.authority.lease is not None and self.authority.lease.motion is not None
-        self.authority, uncommanded = observe(
+        self.authority, uncommanded = follow_motion(
             self.authority, moving=moving, pending=pending, arrived=arrived, now=self.now
         )
         assert not (uncommanded and commanded)
@@ -167,12 +167,12 @@ class Machine(RuleBasedStateMachine):
         counts = resting and lease.motion.seen and not lease.motion.held
         counts = counts and lease.motion.conclusive and lease.motion.last_s < self.now_s
         self.rests = self.rests + 1 if counts else 0
-        self.authority = reported(self.authority, resting=resting, dated_s=self.now_s)
+        self.authority = follow_status(self.authority, resting=resting, dated_s=self.now_s)
         assert self.authority.lease.motion is not None
 
     @rule()
     def controller_refuses(self):
-        self.authority = refused(self.authority)
+        self.authority = drop_refused(self.authority)
 
     @precondition(lambda self: self.authority.lease is not None)
     @rule(name=names)

@@ -10,8 +10,8 @@ from protocol_gateway.authority.preconditions import (
     commands_of,
     controller_command,
     controller_commands,
-    obstacle,
     recoveries_of,
+    refusal_now,
 )
 from protocol_gateway.link.link import LinkState, LinkStatus
 from protocol_gateway.link.motion import MotionDetector, has_arrived, is_moving, motion_may_be_held
@@ -118,7 +118,7 @@ AT_REST = [name for name in ALL if name != "RESUME"]
     ],
 )
 def test_allowed_commands_in_each_state_of_the_controller(situation, allowed):
-    found = [name for name in ALL if not obstacle(command(C.Value(name)), SITUATIONS[situation], JOINTS)]
+    found = [name for name in ALL if not refusal_now(command(C.Value(name)), SITUATIONS[situation], JOINTS)]
     assert found == allowed
 
 
@@ -146,13 +146,13 @@ def test_allowed_commands_in_each_state_of_the_controller(situation, allowed):
     ],
 )
 def test_a_refused_value_is_named_with_the_allowed_ones(asked, words):
-    assert words in obstacle(asked, READY, JOINTS).text
+    assert words in refusal_now(asked, READY, JOINTS).text
 
 
 def test_what_the_driver_does_not_have_is_refused_in_words():
     few = SITUATIONS["stops and moves only"]
-    assert "this controller has no HOLD" in obstacle(command(C.HOLD), few, JOINTS).text
-    assert "its encoders are absolute" in obstacle(command(C.HOME), few, JOINTS).text
+    assert "this controller has no HOLD" in refusal_now(command(C.HOLD), few, JOINTS).text
+    assert "its encoders are absolute" in refusal_now(command(C.HOME), few, JOINTS).text
     assert set(commands_of(few)) == {C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
 
 
@@ -198,7 +198,7 @@ def recover(recovery=RecoverMessage.POWER_ON, reason="the fuse was changed", loo
     ],
 )
 def test_a_recovery_is_refused_by_site_file_state_and_missing_words(request_, controller, code):
-    refusal = obstacle(request_, controller, JOINTS)
+    refusal = refusal_now(request_, controller, JOINTS)
     assert (refusal and _code(refusal)) == (code and code.name)
 
 
@@ -218,7 +218,7 @@ def test_a_driver_without_relative_motion_gets_targets():
     few = SITUATIONS["stops and moves only"]
     asked = [command(C.MOVE_RELATIVE, joint_positions=[0.1, 0, 0, 0, 0]) for _ in range(2)]
     once, twice = ((HOME[0] + 0.1 * times, *HOME[1:]) for times in (1, 2))
-    assert obstacle(asked[0], few, JOINTS) is None
+    assert refusal_now(asked[0], few, JOINTS) is None
     first, second = controller_commands(asked, few, JOINTS)
     assert (first.positions, second.positions) == (pytest.approx(once), pytest.approx(twice))
     assert controller_commands(asked[:1], READY, JOINTS) == [MoveRelative((0.1, 0, 0, 0, 0))]
@@ -227,23 +227,23 @@ def test_a_driver_without_relative_motion_gets_targets():
 def test_motion_is_refused_while_a_stop_could_not_be_sent():
     mute = replace(READY, stop_arrives=False)
     for kind in (C.HOME, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM):
-        refusal = obstacle(command(kind), mute, JOINTS)
+        refusal = refusal_now(command(kind), mute, JOINTS)
         assert "a stop could not be sent" in refusal.text, kind
     for kind in (C.HOLD, C.RESET, C.SPEED):
-        assert obstacle(command(kind), mute, JOINTS) is None
+        assert refusal_now(command(kind), mute, JOINTS) is None
 
 
 def test_a_robot_without_positions_is_homed_but_not_moved():
     untold = replace(READY, positions=None)
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME):
-        assert "has not reported joint positions" in obstacle(command(kind), untold, JOINTS).text
-    assert not obstacle(command(C.HOME), untold, JOINTS)
+        assert "has not reported joint positions" in refusal_now(command(kind), untold, JOINTS).text
+    assert not refusal_now(command(C.HOME), untold, JOINTS)
 
 
 def test_a_robot_with_stale_positions_is_not_even_homed():
     gone = replace(READY, positions=None, positions_stale=codes.POSITIONS_STALE(seconds=1.0))
     for kind in (C.MOVE_RELATIVE, C.MOVE_ABSOLUTE, C.RESUME, C.HOME):
-        assert obstacle(command(kind), gone, JOINTS).text == (
+        assert refusal_now(command(kind), gone, JOINTS).text == (
             "Not sent: the robot's position is unknown (no joint positions for 1 s)."
         )
 

@@ -58,15 +58,15 @@ def proofs(capabilities=READS, **settings):
     ],
 )
 def test_joints_are_proven_for_one_robot_model_and_software(changes, software, code):
-    why = proofs(**changes).joints_unproven(software)
+    why = proofs(**changes).why_joints_unproven(software)
     assert (why and why.code) == (code and code.name)
 
 
 def test_a_controller_without_a_pose_to_compare_with_has_nothing_to_prove():
     bare = proofs(Capabilities(commands=COMMANDS), verified=None)
-    assert (bare.joints_sha256, bare.joints_unproven("")) == ("", None)
+    assert (bare.joints_sha256, bare.why_joints_unproven("")) == ("", None)
     undeclared = replace(READS, no_joints=codes.OTHER(detail="undeclared"))
-    assert proofs(undeclared, verified=None).joints_unproven("") is None
+    assert proofs(undeclared, verified=None).why_joints_unproven("") is None
 
 
 def test_the_hash_is_of_what_places_the_tool_and_of_nothing_else():
@@ -101,7 +101,7 @@ def test_the_hash_is_of_what_places_the_tool_and_of_nothing_else():
 def test_commands_need_a_stop_that_was_tried_with_this_driver_means_and_software(
     capabilities, changes, software, code
 ):
-    why = proofs(capabilities, **changes).read_only(software)
+    why = proofs(capabilities, **changes).why_read_only(software)
     assert (why and why.code) == (code and code.name)
 
 
@@ -118,5 +118,5 @@ def test_commands_need_a_stop_that_was_tried_with_this_driver_means_and_software
 def test_a_motion_waits_until_the_software_is_known_with_which_the_stop_was_tried(
     stop, simulated, software, waits
 ):
-    why = proofs(MOVES, stop=stop, simulated=simulated).software_unknown(software)
+    why = proofs(MOVES, stop=stop, simulated=simulated).why_software_unknown(software)
     assert (why is not None) == waits

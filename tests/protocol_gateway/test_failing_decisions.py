@@ -39,7 +39,7 @@ class FailingPerformers:
     """
 
     problem = None
-    cell_closed = None
+    why_cell_closed = None
 
     def __init__(self, send_error):
         self.calls = []
@@ -86,7 +86,7 @@ class FailingPerformers:
         self.call("check", FAULT)
         return CheckVerdict()
 
-    def changed(self, check_verdict):
+    def why_changed(self, check_verdict):
         self.call("recheck", FAULT)
 
     def controller(self):

@@ -7,7 +7,7 @@ import pytest
 from protocol_gateway.authority.audit_entry import GATEWAY
 from protocol_gateway.authority.events import MotionObserved, StatusReported
 from protocol_gateway.authority.lease_rules import Authority, Now, end_lease, request_lease
-from protocol_gateway.authority.motion_owner import command_sent, observe, reported
+from protocol_gateway.authority.motion_owner import follow_motion, follow_status, record_command
 from protocol_gateway.seam import Activity, Mode, StatusReceived
 from robomesh import reason_codes as codes
 from robomesh.schemas.robomesh_pb2 import CommandRequest, LeaseRequest
@@ -32,15 +32,15 @@ def ask(authority, action, operator="li", **fields):
 
 
 def command(state, kind, time_s, waypoints=(THERE,)):
-    return command_sent(state, CommandRequest(lease="s", command=kind), at(time_s), waypoints=waypoints)
+    return record_command(state, CommandRequest(lease="s", command=kind), at(time_s), waypoints=waypoints)
 
 
 def see(state, moves, time_s):
-    return observe(state, moving=moves, pending=False, arrived=not moves, now=at(time_s))[0]
+    return follow_motion(state, moving=moves, pending=False, arrived=not moves, now=at(time_s))[0]
 
 
 def report(state, time_s, *, resting=True):
-    return reported(state, resting=resting, dated_s=at(time_s).monotonic_s)
+    return follow_status(state, resting=resting, dated_s=at(time_s).monotonic_s)
 
 
 @pytest.fixture

@@ -9,13 +9,13 @@ import pytest
 from robomesh import reason_codes as codes
 from robots.checks.check import check_plan, check_program
 from robots.checks.tool_chain import samples_between, tool_chain, tools_and_jacobians
-from robots.checks.violations import MOST_VIOLATIONS, Runs
+from robots.checks.violations import MOST_VIOLATIONS, ViolationCollector
 from robots.collision import Cell, build_cell
 from robots.collision.path import SAMPLE_M, placements_along, travelled
 from robots.descriptions.cells import CellDescription, CellRobot
 from robots.kinematics.model import tool_jacobian, tool_placement
 from robots.kinematics.motion import Motion
-from robots.kinematics.singularity import reach_of, singularity_margin, singularity_margins
+from robots.kinematics.singularity import arm_length, singularity_margin, singularity_margins
 from robots.kinematics.straight_motion import HOMING_REST_S
 from robots.programs.steps import CheckReport, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed
@@ -216,7 +216,7 @@ def test_vectorized_tools_and_jacobians_equal_pinocchios(robot: str) -> None:
     for at, tool, jacobian, margin in zip(positions, tools, jacobians, margins, strict=True):
         assert tool == pytest.approx(tool_placement(arm.model, at), abs=1e-12)
         assert jacobian == pytest.approx(tool_jacobian(arm.model, at), abs=1e-12)
-        expected = singularity_margin(arm.model, at, reach=reach_of(arm.description))
+        expected = singularity_margin(arm.model, at, reach=arm_length(arm.description))
         assert margin == pytest.approx(expected, abs=1e-12)
 
 
@@ -263,7 +263,7 @@ def test_result_of_a_long_program_is_bounded(shelf: Cell) -> None:
 
 
 def test_adjacent_samples_are_one_violation_with_the_worst_value() -> None:
-    runs = Runs()
+    runs = ViolationCollector()
     for sample, value in ((5, 0.04), (6, 0.008), (7, 0.02), (9, 0.03)):
         runs.add(
             line=3,

@@ -207,7 +207,7 @@ def test_threads_share_the_same_study(own_cache: Path, monkeypatch: pytest.Monke
             assert waiting.acquire(timeout=60.0)
         ended.set()
         for each in asked:
-            assert each.result() == (pair_study.Found(Kind.NOT_STUDIED),)
+            assert each.result() == (pair_study.Finding(Kind.NOT_STUDIED),)
     assert len(started) == 1
     ((failures, _),) = pair_study._failed.values()
     assert failures == 1

@@ -5,17 +5,17 @@ import pytest
 
 from robots.descriptions.description import load
 from robots.kinematics.model import build_model, manipulability, tool_jacobian
-from robots.kinematics.singularity import dexterity, reach_of, singularity_margin
+from robots.kinematics.singularity import arm_length, dexterity, singularity_margin
 
 
 def margin(name, degrees):
     description = load(name)
-    return singularity_margin(build_model(description), np.radians(degrees), reach=reach_of(description))
+    return singularity_margin(build_model(description), np.radians(degrees), reach=arm_length(description))
 
 
 def test_the_reach_is_the_arms_length_from_its_first_joint_to_its_tool():
     # Pt600: rows d 0.35, a 0.30, a 0.30; tool 0.12.
-    assert reach_of(load("pt600")) == pytest.approx(0.35 + 0.30 + 0.30 + 0.12)
+    assert arm_length(load("pt600")) == pytest.approx(0.35 + 0.30 + 0.30 + 0.12)
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_margin_is_zero_only_in_singular_positions(name, stretched, bent):
 @pytest.mark.parametrize("name", ["pt600", "puma560"])
 def test_both_measures_of_one_decomposition_are_those_of_their_own(name):
     description = load(name)
-    model, reach = build_model(description), reach_of(description)
+    model, reach = build_model(description), arm_length(description)
     for positions in np.random.default_rng(1).uniform(-1.0, 1.0, (20, len(model.joints))):
         manipulable, margin = dexterity(tool_jacobian(model, positions), model.joints.types, reach=reach)
         assert manipulable == pytest.approx(manipulability(model, positions), abs=1e-12)
@@ -53,7 +53,7 @@ def test_margin_does_not_depend_on_the_arms_size(tmp_path):
     (tmp_path / "robot.toml").write_text(text, encoding="utf-8")
     (tmp_path / "meshes").symlink_to(library.parent / "meshes")
     twice = load(tmp_path / "robot.toml")
-    assert reach_of(twice) == pytest.approx(2 * reach_of(load("pt600")))
+    assert arm_length(twice) == pytest.approx(2 * arm_length(load("pt600")))
     positions = [10, 40, 60, -40, 5]
-    own = singularity_margin(build_model(twice), np.radians(positions), reach=reach_of(twice))
+    own = singularity_margin(build_model(twice), np.radians(positions), reach=arm_length(twice))
     assert own == pytest.approx(margin("pt600", positions))

@@ -9,7 +9,7 @@ from robots.collision import Nearest
 from robots.descriptions.description import load
 from robots.kinematics.joints import joints_of
 from robots.kinematics.model import build_model
-from robots.kinematics.singularity import reach_of, singularity_margin
+from robots.kinematics.singularity import arm_length, singularity_margin
 from robots.kinematics.straight_motion import straight_motion
 from services.kinematics.alarms import Alarms
 from services.kinematics.conditions import (
@@ -92,7 +92,7 @@ def demonstrated(robot, *, speed, for_s, step_s):
 @pytest.mark.parametrize("speed", [0.6, 0.1])
 def test_a_cycle_through_singular_positions_is_one_event(speed):
     description = load("pt600")
-    model, reach, alarms = build_model(description), reach_of(description), Alarms()
+    model, reach, alarms = build_model(description), arm_length(description), Alarms()
     codes, margins = [], []
     for now_s, positions in demonstrated("pt600", speed=speed, for_s=600.0, step_s=0.2):
         margins.append(singularity_margin(model, positions, reach=reach))

@@ -24,7 +24,7 @@ except ImportError:
     raise SystemExit(missing("asyncua", "opcua")) from None
 
 from controllers.opcua import facts
-from controllers.opcua.facts import Found, Reading, Values, encode
+from controllers.opcua.facts import ItemsFound, Reading, Values, encode
 from controllers.opcua.reader.discovery import Discovery
 from controllers.opcua.reader.problems import ReadingError, in_words
 from controllers.opcua.reader.security import secured_client
@@ -154,7 +154,7 @@ async def _subscribe(session: ReadOnlySession, settings: OpcUaSettings, write: A
     slowest_s = max(axes_s, default=each_s)
     if axes_s and slowest_s > 1.5 * each_s:
         server += f"; it samples axes each {slowest_s:g} s, {each_s:g} s was asked for"
-    write(encode(Found(tuple(each.item for each in variables), server, slowest_s)))
+    write(encode(ItemsFound(tuple(each.item for each in variables), server, slowest_s)))
     open_ = True
     for changes in early:
         on_changes(changes)

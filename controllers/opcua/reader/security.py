@@ -12,7 +12,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 
 from controllers.opcua.reader.problems import ReadingError, in_words
-from controllers.opcua.reader.session import TIMEOUT_S, OnlyReads
+from controllers.opcua.reader.session import TIMEOUT_S, ReadOnlyGuard
 from controllers.opcua.settings import OpcUaSettings
 from protocol_gateway.seam.errors import GatewaySettingsError
 from protocol_gateway.seam.secret_file import read_password, read_secret
@@ -35,7 +35,7 @@ def client_of(url: str) -> Client:
     """Return a client without security, which only reads."""
     client = Client(url, timeout=TIMEOUT_S)
     client.name = client.description = _NAME
-    client.uaclient.observer = OnlyReads()
+    client.uaclient.observer = ReadOnlyGuard()
     return client
 
 

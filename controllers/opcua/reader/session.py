@@ -38,7 +38,7 @@ _LIMITS = (ua.NodeId(11705, 0), ua.NodeId(11710, 0), ua.NodeId(11714, 0))
 _T = TypeVar("_T")
 
 
-class OnlyReads(Observer):  # type: ignore[misc]  # the library is not typed
+class ReadOnlyGuard(Observer):  # type: ignore[misc]  # the library is not typed
     """Guard that sees each request before it is sent."""
 
     def observe_request(self, request: Any) -> AbstractContextManager[None]:
@@ -236,7 +236,7 @@ def _parts(values: Sequence[_T], length: int) -> Iterator[Sequence[_T]]:
 @asynccontextmanager
 async def connected(client: Client) -> AsyncIterator["ReadOnlySession"]:
     """Connect a client, yield its session, and disconnect."""
-    client.uaclient.observer = OnlyReads()
+    client.uaclient.observer = ReadOnlyGuard()
     client.session_timeout = round(_SESSION_S * 1e3)
     await client.connect()
     try:

@@ -38,7 +38,7 @@ _LOCAL = pin.ReferenceFrame.LOCAL
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class DescentEnd:
     """The end of a descent: x (m,) [rad] or [m], and the tool's deviation from its target there."""
 
     x: FloatArray
@@ -63,7 +63,7 @@ class Found:
 
 def descend(
     chain: Chain, target: Any, rows: int, x: FloatArray, *, limited: bool = True, place_first: bool = False
-) -> Found:
+) -> DescentEnd:
     """Minimize the deviation from a target, from a start.
 
     Args:
@@ -124,7 +124,7 @@ def descend(
             step = step.reshape(-1)
         x = clipped(chain, step) if limited else step
         stopped = limited and x.tobytes() != step.tobytes()  # a fifth of the time of comparing the arrays
-    return Found(x, *misses(placement.homogeneous.ravel().tolist(), rows))
+    return DescentEnd(x, *misses(placement.homogeneous.ravel().tolist(), rows))
 
 
 def _held(chain: Chain, x: FloatArray, slope: FloatArray) -> list[int]:

@@ -10,7 +10,7 @@ import numpy as np
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 from robots.kinematics.inverse.chain import Chain, placement_misses
-from robots.kinematics.inverse.numeric import Found, descend, starts
+from robots.kinematics.inverse.numeric import DescentEnd, descend, starts
 from robots.kinematics.inverse.tasks import TOLERANCE_M, Task
 from robots.kinematics.joints import FloatArray, violations
 from robots.schema.robot_toml import JointType
@@ -25,10 +25,10 @@ def reason_for_none(
     target: Any,
     task: Task,
     beyond: Sequence[FloatArray],
-    nearest: Found,
+    nearest: DescentEnd,
     around: FloatArray,
     seed: int,
-) -> tuple[Reason, Found]:
+) -> tuple[Reason, DescentEnd]:
     """Return why no joint positions put the tool at a target, in degrees and millimetres.
 
     Args:
@@ -51,7 +51,7 @@ def reason_for_none(
     if not closest.near_enough:
         return codes.INVERSE_GAP(distance=_mm(closest.residual_m)), nearest
     posed = [
-        Found(each.x, *placement_misses(chain, each.x, target, task.rows))
+        DescentEnd(each.x, *placement_misses(chain, each.x, target, task.rows))
         for each in there
         if each.near_enough
     ]
@@ -63,7 +63,7 @@ def reason_for_none(
 
 
 def solutions_beyond(
-    chain: Chain, target: Any, task: Task, known: Sequence[Sequence[float]], nearest: Found, seed: int
+    chain: Chain, target: Any, task: Task, known: Sequence[Sequence[float]], nearest: DescentEnd, seed: int
 ) -> list[FloatArray]:
     """Return solutions (m,) that ignore limits, with each rotary joint at the turn nearest to its limits.
 
@@ -73,7 +73,7 @@ def solutions_beyond(
         nearest: The nearest result within limits.
     """
     placed = [np.array(x) for x in known]
-    found = [Found(x, *placement_misses(chain, x, target, task.rows)) for x in placed]
+    found = [DescentEnd(x, *placement_misses(chain, x, target, task.rows)) for x in placed]
     if not any(each.near_enough for each in found) and not beyond_reach(chain, target):
         begins = [nearest.x, *islice(starts(chain, seed), _TRIES)]
         found = [descend(chain, target, task.rows, begin, limited=False) for begin in begins]

@@ -20,7 +20,7 @@ from robots.kinematics.inverse.closed_form import (
     windows,
     within_limits,
 )
-from robots.kinematics.inverse.numeric import Found, clipped, descend, starts
+from robots.kinematics.inverse.numeric import DescentEnd, clipped, descend, starts
 from robots.kinematics.inverse.reasons import beyond_reach, reason_for_none, solutions_beyond
 from robots.kinematics.inverse.tasks import Task, tool_pose
 from robots.kinematics.joints import FloatArray, as_positions
@@ -174,12 +174,12 @@ def _clipped_start(chain: Chain, near: ArrayLike) -> FloatArray:
 
 def _verify(
     chain: Chain, found: Iterable[list[float]], target: Any, task: Task, around: FloatArray
-) -> Iterator[Found]:
+) -> Iterator[DescentEnd]:
     """Yield each solution that puts the tool at the target once, refined if rounding made it inexact."""
     known: list[FloatArray] = []
     for each in found:
         x = clipped(chain, np.array(each))
-        here = Found(x, *placement_misses(chain, x, target, task.rows))
+        here = DescentEnd(x, *placement_misses(chain, x, target, task.rows))
         if here.residual_m > EXACT or here.residual_rad > EXACT:
             here = descend(chain, target, task.rows, x)
         if not here.near_enough or (known and any(np.abs(here.x - other).max() < _SAME for other in known)):
@@ -216,16 +216,16 @@ def _search(
     *,
     enough: int,
     soon: int,
-) -> tuple[list[Found], Found]:
+) -> tuple[list[DescentEnd], DescentEnd]:
     """Search from each of `begins`; return the solutions, nearest first, and the best descent.
 
     Args:
         enough: Number of solutions at which the search ends.
         soon: Number of descents after which one solution is enough, even one that is not exact.
     """
-    found: list[Found] = []
-    rough: list[Found] = []
-    nearest: Found | None = None
+    found: list[DescentEnd] = []
+    rough: list[DescentEnd] = []
+    nearest: DescentEnd | None = None
     for number, begin in enumerate(begins):
         here = descend(chain, target, task.rows, begin)
         if nearest is None or here.squared < nearest.squared:
@@ -267,7 +267,7 @@ def _positions(chain: Chain, x: FloatArray, around: FloatArray) -> FloatArray:
     return positions
 
 
-def _answer(chain: Chain, found: list[Found], around: FloatArray, *, analytic: bool) -> InverseResult:
+def _answer(chain: Chain, found: list[DescentEnd], around: FloatArray, *, analytic: bool) -> InverseResult:
     return InverseResult(
         np.array([_positions(chain, each.x, around) for each in found]),
         max([each.residual_m for each in found]),

@@ -8,7 +8,7 @@ import psutil
 import pytest
 
 from controllers.opcua.driver import OPCUA, OpcUaDriver
-from controllers.opcua.facts import Found, Item, Reading, Values, encode
+from controllers.opcua.facts import Item, ItemsFound, Reading, Values, encode
 from controllers.opcua.settings import OpcUaJoint, OpcUaSettings, OpcUaSignal, from_text, to_text
 from controllers.opcua.units import Unit, number_of
 from protocol_gateway.seam import (
@@ -55,7 +55,7 @@ class Told:
         assert from_text(opened.settings).rate_hz == 20.0
         self.driver.opened(OPCUA, NOW_S)
         items = axes(DEGREE, DEGREE) if items is None else items
-        self.begin = self.tell(Found(tuple(items), "server X", sampling_s))
+        self.begin = self.tell(ItemsFound(tuple(items), "server X", sampling_s))
 
     def tell(self, fact, after_s=0.05):
         self.now_s += after_s
@@ -233,7 +233,7 @@ def test_stop_of_the_safety_system_is_an_alarm_when_it_begins_also_over_connecti
     assert alarms() == [(Severity.ERROR, "safety.emergency_stop")]
     told.values((3, True, 0.0, False))  # unknown, so not known to be over
     told.driver.opened(OPCUA, told.now_s)
-    told.tell(Found(tuple(items), "server X", 0.05))
+    told.tell(ItemsFound(tuple(items), "server X", 0.05))
     told.values((2, True), (3, True))
     assert alarms() == []
     told.values((3, False))
@@ -347,7 +347,7 @@ def test_identity_is_reported_once_also_over_connections():
     assert SoftwareReceived("1.2") in told.events
     told.driver.closed(OPCUA, told.now_s)
     told.driver.opened(OPCUA, told.now_s)
-    again = told.tell(Found(tuple(items), "server X", 0.05))
+    again = told.tell(ItemsFound(tuple(items), "server X", 0.05))
     again += told.values((0, 1.0), (1, 1.0), (2, "R6"), (3, "1.2"))
     assert not [each for each in again if isinstance(each, AlarmReceived)]
 

@@ -15,11 +15,11 @@ import pytest
 import controllers.opcua.reader as reader
 from controllers.opcua.certificate import make
 from controllers.opcua.driver import OPCUA, OpcUaDriver
-from controllers.opcua.facts import Found, Values, decode
+from controllers.opcua.facts import ItemsFound, Values, decode
 from controllers.opcua.reader import process
 from controllers.opcua.reader.problems import ReadingError, in_words
 from controllers.opcua.reader.security import endpoints_of, offers_of
-from controllers.opcua.reader.session import ALLOWED, OnlyReads
+from controllers.opcua.reader.session import ALLOWED, ReadOnlyGuard
 from controllers.opcua.settings import OpcUaJoint, OpcUaSettings, OpcUaSignal, to_text
 from protocol_gateway.seam import JointsReceived
 from robots.kinematics.joints import JointType
@@ -56,7 +56,7 @@ async def ending(port, **settings):
 
 def values_of(facts):
     """Return the last value of each item by its kind and name, None if it is not good."""
-    (found,) = (each for each in facts if isinstance(each, Found))
+    (found,) = (each for each in facts if isinstance(each, ItemsFound))
     last = {}
     for fact in facts:
         for each in fact.readings if isinstance(fact, Values) else ():
@@ -262,7 +262,7 @@ def test_session_has_no_service_that_writes_or_calls():
         pass
 
     with pytest.raises(ReadingError, match="WriteRequest is not sent: the session only reads"):
-        OnlyReads().observe_request(WriteRequest())
+        ReadOnlyGuard().observe_request(WriteRequest())
     assert not [
         name for name in ALLOWED if name.startswith(("Write", "Call", "HistoryUpdate", "Add", "Delete"))
     ]
