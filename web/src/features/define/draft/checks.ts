@@ -79,7 +79,7 @@ export const readingShapes = computed(() => {
   return now !== null && bodies(now.description).some(({ mesh }) => mesh && shapeOf(mesh, now.files) === "reading");
 });
 
-let timer = 0;
+let timer: ReturnType<typeof setTimeout> | undefined;
 let request: AbortController | null = null;
 
 /** Check each change of the draft and of the joints until the returned function is called. */

@@ -91,7 +91,7 @@ export function isTouching({ kind }: PairRow): boolean {
 
 /** Compute the plan of each change of the draft until the returned function is called. */
 export function startPlanning(): () => void {
-  let timer = 0;
+  let timer: ReturnType<typeof setTimeout> | undefined;
   const end = effect(() => {
     clearTimeout(timer);
     if (!subject.value || planning.value || isPlanned.value || planError.value) return;

@@ -1,0 +1,17 @@
+import { defineConfig } from "vitest/config";
+
+export default defineConfig({
+  test: {
+    dir: "tests",
+    environment: "happy-dom",
+    reporters: ["dot"],
+    unstubGlobals: true,
+    restoreMocks: true,
+    coverage: {
+      include: ["src/**"],
+      exclude: ["src/gen/**"],
+      reporter: ["json-summary"],
+      reportsDirectory: "node_modules/.coverage",
+    },
+  },
+});
