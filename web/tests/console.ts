@@ -81,10 +81,12 @@ function open(path: string): void {
 }
 
 /** Send the page a message of the console. */
-export function say(message: ToPage): void {
-  const bytes = toBinary(ToPageSchema, create(ToPageSchema, { message }));
+export const say = (message: ToPage): void => deliver(toBinary(ToPageSchema, create(ToPageSchema, { message })));
+
+/** Deliver a message to the page, as it was received. */
+export function deliver(bytes: Uint8Array): void {
   const socket = sockets.findLast((each) => each.path === "/mesh");
-  socket?.onmessage?.({ data: bytes.buffer as ArrayBuffer });
+  socket?.onmessage?.({ data: Uint8Array.from(bytes).buffer });
 }
 
 /** Send the page a publication. */
