@@ -6,6 +6,7 @@ RendererError
 ├── GlbError                a shape is not valid GLB
 ├── ChainError              a URDF is not a tree of joints
 ├── Mp4Error                packets cannot be put into an MP4 file
+├── PictureError            a picture cannot be written
 └── ViewError               a view that cannot be drawn, with the reason
     ├── ViewRequestError    a requested view is not possible
     │   └── NoRoomError     a requested view exceeds what can be drawn now
@@ -54,6 +55,10 @@ class ChainError(RendererError):
 
 class Mp4Error(RendererError):
     """Packets cannot be put into an MP4 file."""
+
+
+class PictureError(RendererError):
+    """A picture cannot be written."""
 
 
 class ViewError(RendererError):

@@ -92,9 +92,18 @@ def show(
     tool = tool_placement(model, model.joints.home)
     summary = {**description_summary(description), "tool_at_home": tool.tolist()}
     if png is not None:
-        from services.command_line.robots.drawing import draw_four_views
+        import numpy as np
 
-        draw_four_views(description, png)
+        from renderer.pictures.four_views import draw_four_views
+        from robots.descriptions.glb import link_glbs
+        from robots.descriptions.urdf.write import to_urdf
+        from services.kinematics.descriptions import describe
+
+        shapes, urdf = link_glbs(description), to_urdf(description)
+        message = describe(
+            description, urdf=urdf, shapes=shapes, base_to_site=np.eye(4), cell="", simulated=False
+        )
+        draw_four_views(message, shapes, png)
     if as_json:
         print_json(summary)
         return
