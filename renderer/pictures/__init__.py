@@ -1,4 +1,4 @@
-"""One picture from a robot's state and a requested view: composition, texts, lines, encoded result; four views of a robot.
+"""One picture from a robot's state and a requested view: composition, texts, lines, encoded result.
 
-No topics, and nothing that decides when to draw (`service`).
+Also a robot's four views, for the command line. No topics, and nothing that decides when to draw (`service`).
 """

@@ -11,11 +11,11 @@ import typer
 from robomesh.client.recordings.recorder_file import Fetched, RecorderFile
 from robomesh.contract.endpoints import DEFAULT_ROUTER
 from robomesh.errors import QuotaError
-from services.command_line.record.export.errors import ExportError
 from services.command_line.record.listing import attached_for, found
 from services.command_line.terminal import discovery
 from services.command_line.terminal.options import Connect, Json
 from services.command_line.terminal.output import print_json, print_line, progress
+from services.export.errors import ExportError
 
 
 def fetch(

@@ -25,11 +25,11 @@ from robomesh.recordings.errors import RecordingError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.texts import for_terminal
 from robomesh.wire.session import Session
-from services.command_line.record.export.errors import ExportError
 from services.command_line.terminal import discovery
 from services.command_line.terminal.local_time import local_time, time_text
 from services.command_line.terminal.options import Connect, Json
 from services.command_line.terminal.output import print_json, print_line
+from services.export.errors import ExportError
 
 NamedRecording = Annotated[
     str, typer.Argument(metavar="[SITE/]NAME", help="A name or file from `list`; not that of several.")

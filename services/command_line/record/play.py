@@ -17,11 +17,11 @@ from robomesh.errors import RobomeshError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.presence import OPERATOR, session_of
 from robomesh.wire.session import Session
-from services.command_line.record.export.errors import ExportError
 from services.command_line.record.listing import RecordingSource, attached_for, found
 from services.command_line.terminal import discovery
 from services.command_line.terminal.options import Connect
 from services.command_line.terminal.output import print_line, progress
+from services.export.errors import ExportError
 
 _OPEN_WITHIN_S = 20.0
 # A player publishes its position five times a second, also when paused.

@@ -8,9 +8,9 @@ import typer
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.writing import recover as files
 from robomesh.recordings.writing.capture import is_being_written
-from services.command_line.record.export.errors import ExportError
 from services.command_line.terminal.options import Json
 from services.command_line.terminal.output import print_json, print_line, progress
+from services.export.errors import ExportError
 
 
 def recover(file: Annotated[Path, typer.Argument(metavar="FILE.mcap")], as_json: Json = False) -> None:

@@ -42,7 +42,7 @@ from services.console.http.recording_span import Span, span_of
 from services.console.http.streaming import Streamed
 
 # Rendering needs the packages of a renderer, which a console on another machine may lack.
-_MODULE = "services.command_line.record.export.render_worker"
+_MODULE = "services.export.render_worker"
 _NICE = 10
 _LONGEST_S = 900.0
 _MOST_WAITING = 4

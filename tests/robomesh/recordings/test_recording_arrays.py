@@ -27,8 +27,8 @@ from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.writing.capture import Capture
 from robomesh.recordings.writing.recover import recover
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.record.export.span import Span
 from services.command_line.record.export.tables import write_table
+from services.export.span import Span
 from tests.recordings import START_NS, Written, joints, write_recording
 
 _Joint = schema.Description.Joint

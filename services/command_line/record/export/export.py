@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robomesh.recordings.reading import RecordingFile
-from services.command_line.record.export.errors import ExportError
 from services.command_line.record.export.output import atomic_file
-from services.command_line.record.export.span import Span, span_of
-from services.command_line.terminal.output import print_json, print_line
+from services.command_line.terminal.output import print_json, print_line, progress
+from services.export.errors import ExportError
+from services.export.span import Span, span_of
 
 _PLOTS = (".png", ".pdf", ".svg")
 
@@ -85,8 +85,9 @@ def _write(
 
         pictures, duration_s = write_recorded(file, span, target, wanted.recorded)
     else:
-        from services.command_line.record.export.rendered_video import Rendering, write_rendered
+        from services.export.rendered_video import Rendering, write_rendered
 
         rendering = Rendering(view=wanted.view, size=wanted.size, fps=wanted.fps, samples=wanted.samples)
-        pictures, duration_s = write_rendered(file, span, target, rendering)
+        with progress("video") as report:
+            pictures, duration_s = write_rendered(file, span, target, rendering, on_progress=report)
     return f"{pictures} pictures, {duration_s:.1f} s", {"pictures": pictures, "duration_s": duration_s}

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from services.command_line.record.export.errors import ExportError
+from services.export.errors import ExportError
 
 
 @contextlib.contextmanager

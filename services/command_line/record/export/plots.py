@@ -11,10 +11,10 @@ from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.series.downsampling import MOST_VALUES, Series, SeriesReader, known_values
 from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.record.export.errors import ExportError
-from services.command_line.record.export.span import Span, decoded, topics_of
 from services.command_line.terminal.local_time import time_text
 from services.command_line.terminal.output import progress
+from services.export.errors import ExportError
+from services.export.span import Span, decoded, topics_of
 
 COLORS = ("#1462a8", "#8a6a1f", "#2b7a4b", "#93456f", "#5a51a8", "#5b6369", "#9a5426")
 _TEXT, _LINE = "#1d2124", "#cbd0d3"

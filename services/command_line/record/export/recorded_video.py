@@ -9,9 +9,9 @@ from renderer.encoding.mp4 import FragmentedMp4
 from robomesh.recordings.h264 import holds_key_frame
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.publisher_time import PublisherTimes
-from services.command_line.record.export.errors import ExportError
-from services.command_line.record.export.span import Span, decoded, needed
 from services.command_line.terminal.output import progress
+from services.export.errors import ExportError
+from services.export.span import Span, decoded, needed
 
 
 def write_recorded(file: RecordingFile, span: Span, target: Path, view: str) -> tuple[int, float]:

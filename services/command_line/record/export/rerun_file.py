@@ -26,14 +26,13 @@ from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.recordings.series.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.shapes.files.gltf import glb_to_z_up, read_glb
-from services.command_line.record.export.errors import ExportError
 from services.command_line.record.export.plots import COLORS, panels_of
 from services.command_line.record.export.recorded_video import recorded_pictures
 from services.command_line.record.export.rerun_layout import PUBLISHER_TIME, RECEIVE_TIME, blueprint
-from services.command_line.record.export.shapes import recorded_shape
-from services.command_line.record.export.span import Span, decoded, topics_of
-from services.command_line.record.export.tables import description_of
 from services.command_line.terminal.output import print_line, progress
+from services.export.errors import ExportError
+from services.export.shapes import recorded_shape
+from services.export.span import Span, decoded, description_of, topics_of
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -11,9 +11,9 @@ from google.protobuf.message import Message
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.table import Table, is_due, table_of
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.record.export.errors import ExportError
-from services.command_line.record.export.span import Span, decoded, needed, topics_of
 from services.command_line.terminal.output import progress
+from services.export.errors import ExportError
+from services.export.span import Span, decoded, description_of, needed, topics_of
 
 _REPORT_EACH = 5000
 
@@ -74,10 +74,3 @@ def _decoded(
     for message in file.messages((key,), start_ns=span.start_ns, end_ns=span.end_ns + 1):
         if (state := decoded(kind, message.data)) is not None:
             yield message, state
-
-
-def description_of(file: RecordingFile) -> schema.Description | None:
-    """Return the robot's description; None: the recording has none."""
-    topic = topics_of(file).get("description")
-    newest = None if topic is None else file.newest(topic, file.layout.end_ns)
-    return None if newest is None else decoded(schema.Description, newest.data)

@@ -4,7 +4,7 @@ from renderer.shapes.cache import cache_folder, stored_glb
 from robomesh.recordings.errors import RecordingError
 from robomesh.recordings.reading import RecordingFile
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.record.export.errors import ExportError
+from services.export.errors import ExportError
 
 
 def recorded_shape(file: RecordingFile, body: schema.Description.Link | schema.Description.Fixture) -> bytes:

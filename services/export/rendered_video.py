@@ -20,11 +20,9 @@ from renderer.shapes.cache import cache_folder
 from robomesh.recordings.reading import RecordedMessage, RecordingFile
 from robomesh.recordings.series.publisher_time import PublisherTimes
 from robomesh.schemas import robomesh_pb2 as schema
-from services.command_line.record.export.errors import ExportError
-from services.command_line.record.export.shapes import recorded_shape
-from services.command_line.record.export.span import Span, decoded, needed, topics_of
-from services.command_line.record.export.tables import description_of
-from services.command_line.terminal.output import progress
+from services.export.errors import ExportError
+from services.export.shapes import recorded_shape
+from services.export.span import Span, decoded, description_of, needed, topics_of
 
 _KEY_FRAME_EACH_S = 2.0
 _LARGEST_PX, _SMALLEST_PX = 4096, 64
@@ -50,12 +48,12 @@ def write_rendered(
     target: Path,
     rendering: Rendering,
     *,
-    on_progress: Callable[[float], None] = lambda share: None,
+    on_progress: Callable[[float], None],
 ) -> tuple[int, float]:
     """Render and write the video; return pictures and seconds.
 
     Args:
-        on_progress: Called with the rendered share, from 0 to 1; a terminal shows a bar too.
+        on_progress: Called with the rendered share, from 0 to 1.
 
     Raises:
         ExportError: If the recording has no description, or a mesh is missing.
@@ -72,7 +70,7 @@ def write_rendered(
     try:
         _take_shapes(file, state.appearance.description, studio)
         encoder = open_encoder(rendering.size, rendering.fps)
-        with target.open("wb") as stream, progress("video") as report:
+        with target.open("wb") as stream:
             for number, (time_ns, ages) in enumerate(_pictures(file, span, state, rendering.fps)):
                 composition = compose(spec, state.appearance, RobotSnapshot(state, ages), ())
                 drawn = studio.draw(
@@ -88,7 +86,6 @@ def write_rendered(
                 write_over(drawn.picture, composition.overlay)
                 packet = encoder.encode(drawn.picture, key_frame=number % key_each == 0)
                 stream.write(mp4.add(packet.data, time_ns, usual_s=1 / rendering.fps))
-                report(span.share(time_ns))
                 on_progress(span.share(time_ns))
     finally:
         studio.close()

@@ -9,8 +9,8 @@ from typing import Any
 
 from robomesh.files.worker import answer_all, report
 from robomesh.recordings.reading import RecordingFile
-from services.command_line.record.export.rendered_video import Rendering, write_rendered
-from services.command_line.record.export.span import span_of
+from services.export.rendered_video import Rendering, write_rendered
+from services.export.span import span_of
 
 _STEP = 0.01
 

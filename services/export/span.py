@@ -1,4 +1,4 @@
-"""A part of a recording, and the names of its topics."""
+"""A part of a recording, the names of its topics, and its description of the robot."""
 
 from typing import NamedTuple, TypeVar
 
@@ -6,7 +6,8 @@ from google.protobuf.message import DecodeError, Message
 
 from robomesh.recordings.names import robot_channels
 from robomesh.recordings.reading import RecordingFile
-from services.command_line.record.export.errors import ExportError
+from robomesh.schemas import robomesh_pb2 as schema
+from services.export.errors import ExportError
 
 M = TypeVar("M", bound=Message)
 
@@ -66,3 +67,10 @@ def decoded(kind: type[M], data: bytes) -> M | None:
         return kind.FromString(data)
     except DecodeError:
         return None
+
+
+def description_of(file: RecordingFile) -> schema.Description | None:
+    """Return the robot's description; None: the recording has none."""
+    topic = topics_of(file).get("description")
+    newest = None if topic is None else file.newest(topic, file.layout.end_ns)
+    return None if newest is None else decoded(schema.Description, newest.data)
