@@ -20,7 +20,7 @@ from robomesh.recordings.writing.capture import Capture
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.disk import Disk, ended_by
 from services.recorder.file_writer import STATES, CaptureSink, OnPublication
-from services.recorder.finishing import Finisher, Job
+from services.recorder.indexing import IndexingQueue, Job
 from services.recorder.settings import MIB, Settings
 from services.recorder.subscriptions import Subscriptions
 
@@ -129,8 +129,8 @@ class CaptureFiles:
 class RobotRecorder:
     """Capture of a robot, on request or while its controller traces."""
 
-    def __init__(self, files: CaptureFiles, finisher: Finisher) -> None:
-        self._files, self._finisher = files, finisher
+    def __init__(self, files: CaptureFiles, indexing_queue: IndexingQueue) -> None:
+        self._files, self._queue = files, indexing_queue
         self._settings, self._robot = files.settings, files.robot
         self._folder = files.settings.folder / files.robot
         self._lock = asyncio.Lock()
@@ -224,7 +224,7 @@ class RobotRecorder:
         if self.part is not None:
             self._files.count(self.part)
             self.last = self.part.describe()
-        if (indexing := self._finisher.progress.get(self.last.file)) is not None:
+        if (indexing := self._queue.progress.get(self.last.file)) is not None:
             self.last.indexing = indexing
         else:
             self.last.ClearField("indexing")
@@ -237,7 +237,7 @@ class RobotRecorder:
         except OSError as error:  # the disk has already reported it
             return ended_by(error)
         path = part.capture.path
-        self._finisher.submit(Job(path, (path,), about))
+        self._queue.submit(Job(path, (path,), about))
         return None
 
     def _path(self, name: str, part: int) -> Path:

@@ -24,7 +24,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.captures import CaptureFiles, check_name
 from services.recorder.disk import error_text
 from services.recorder.file_writer import STATES, CaptureSink
-from services.recorder.finishing import Finisher, Job
+from services.recorder.indexing import IndexingQueue, Job
 from services.recorder.settings import MIB
 from services.recorder.settings import Flight as Settings
 
@@ -79,13 +79,13 @@ class FlightRecorder:
     def __init__(
         self,
         files: CaptureFiles,
-        finisher: Finisher,
+        indexing_queue: IndexingQueue,
         settings: Settings,
         *,
         on_save: Callable[[CaptureSink], None],
         report: Callable[[schema.Event.Severity, str, str], None],
     ) -> None:
-        self._files, self._finisher, self._settings = files, finisher, settings
+        self._files, self._queue, self._settings = files, indexing_queue, settings
         self._folder = files.settings.folder / FLIGHT_FOLDER / files.robot
         self._target = files.settings.folder / files.robot
         self._loop = asyncio.get_running_loop()
@@ -296,7 +296,7 @@ class FlightRecorder:
             self._on_saved(save, error_text(error))
             return
         await asyncio.to_thread(save.write_mark, self._folder)
-        self._finisher.submit(Job(save.target, save.segments, save.about, partial(self._on_saved, save)))
+        self._queue.submit(Job(save.target, save.segments, save.about, partial(self._on_saved, save)))
 
     def _on_saved(self, save: _Save, problem: str | None) -> None:
         name = save.about["name"]

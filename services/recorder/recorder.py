@@ -27,8 +27,8 @@ from services.recorder.changes import RecordingChanges
 from services.recorder.disk import Disk, error_text
 from services.recorder.events import EventReporter, report_disk
 from services.recorder.file_writer import CaptureSink
-from services.recorder.finishing import Finisher, Job
 from services.recorder.flight import FlightRecorder
+from services.recorder.indexing import IndexingQueue, Job
 from services.recorder.left_files import left_state, lock_folder
 from services.recorder.reading.serving import RecordingServer
 from services.recorder.reading.uses import RecordingUses
@@ -65,12 +65,12 @@ class _Robot:
         files = CaptureFiles(settings, name, recorder.subscriptions, recorder.disk, self._on_open)
         self.name = name
         self.recorder = recorder
-        self.captures = RobotRecorder(files, recorder.finisher)
+        self.captures = RobotRecorder(files, recorder.indexing_queue)
         self.flight: FlightRecorder | None = None
         if settings.flight.minutes:
             self.flight = FlightRecorder(
                 files,
-                recorder.finisher,
+                recorder.indexing_queue,
                 settings.flight,
                 on_save=self._add_description,
                 report=partial(recorder.events.report, name),
@@ -198,7 +198,7 @@ class _Recorder:
         self._robots: dict[str, _Robot] = {}
         self.subscriptions = Subscriptions(session.zenoh_session, settings.site, session.ignored)
         self.disk = Disk(settings.folder, settings.free, self._on_failed)
-        self.finisher = Finisher()
+        self.indexing_queue = IndexingQueue()
         self.events = EventReporter(session, settings.site)
         self.descriptions = DescriptionCache(session, settings.site, self._on_known)
         self._uses = RecordingUses()
@@ -243,7 +243,7 @@ class _Recorder:
             left = sorted(self.settings.folder.glob(f"*/*{SUFFIX}"))
             for robot in self.settings.robots:
                 await self._add(robot)
-            for work in (self.finisher.serve, self.descriptions.serve, self._follow_traces, self._tick):
+            for work in (self.indexing_queue.serve, self.descriptions.serve, self._follow_traces, self._tick):
                 group.create_task(work())
             group.create_task(self._watch())
             self.start(self._recover(left))
@@ -298,7 +298,7 @@ class _Recorder:
         except OSError as error:
             log.error("%s: %s", self.settings.folder, error)
         for path in self.settings.folder.glob(f"*/*{INDEXING}"):
-            if path.with_suffix(SUFFIX).name not in self.finisher.progress:
+            if path.with_suffix(SUFFIX).name not in self.indexing_queue.progress:
                 path.unlink()  # left by a killed indexer; the recording itself is complete
         for path in left:
             try:
@@ -307,9 +307,9 @@ class _Recorder:
                 log.warning("%s", error)
                 continue
             if state is State.UNFINISHED:
-                self.finisher.submit(Job(path, (path,), {"recovered": "yes"}, self._recovered(path)))
+                self.indexing_queue.submit(Job(path, (path,), {"recovered": "yes"}, self._recovered(path)))
             elif state is State.CLOSED:
-                self.finisher.submit(Job(path, (path,)))
+                self.indexing_queue.submit(Job(path, (path,)))
 
     def _recovered(self, path: Path) -> Callable[[str | None], None]:
         def done(problem: str | None) -> None:
@@ -383,7 +383,7 @@ class _Recorder:
         """Return the reason why a recording must not be deleted now; called on another thread."""
         if file in self._open_files:
             return codes.RECORDING_WRITTEN(name=name)
-        if file in self.finisher.progress:
+        if file in self.indexing_queue.progress:
             return codes.RECORDING_INDEXED(name=name)
         return self._uses.of(file, name)
 

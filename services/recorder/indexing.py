@@ -33,7 +33,7 @@ class Job:
     done: Callable[[str | None], None] = lambda _: None
 
 
-class Finisher:
+class IndexingQueue:
     """Queue of jobs, run one by one by `serve`."""
 
     def __init__(self) -> None:
