@@ -18,7 +18,7 @@ from mcap_protobuf.schema import register_schema
 from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.reindex import index
+from robomesh.recordings.writing.rewrite import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_glbs
@@ -145,7 +145,7 @@ def write_capture(
         capture.add(key, topic("joints"), Header(7, number, at_ns), data, received_ns=at_ns)
     if closed:
         capture.finish({key: missed})
-        index(path)
+        rewrite([path], path)
     else:
         capture.hand_over()
         capture.write_out()

@@ -46,7 +46,7 @@ from robomesh.recordings.files import describe_file
 from robomesh.recordings.reading import RecordingFile
 from robomesh.recordings.writing.capture import Capture
 from robomesh.recordings.writing.recover import State, state_of
-from robomesh.recordings.writing.reindex import index
+from robomesh.recordings.writing.rewrite import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
 
@@ -183,7 +183,7 @@ def writers(peers_python: str) -> dict[str, Any]:
                 capture.write_out()
         capture.finish({})
         written = time.perf_counter()
-        index(capture.path)
+        rewrite([capture.path], capture.path)
         found["ours"] = {"messages_per_s": round(WRITTEN / (written - begun))}
         found["ours, indexed and checked afterwards"] = {
             "messages_per_s": round(WRITTEN / (time.perf_counter() - written))
@@ -224,7 +224,7 @@ def seek(megabytes: int) -> dict[str, Any]:
                 capture.write_out()
         capture.finish({})
         begun = time.perf_counter()
-        index(path)
+        rewrite([path], path)
         indexed_s = time.perf_counter() - begun
         opened: list[float] = []
         took: list[float] = []

@@ -14,7 +14,7 @@ from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.reindex import rewrite
+from robomesh.recordings.writing.rewrite import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder import flight
 from services.recorder.settings import Flight

@@ -38,7 +38,7 @@ def worker_process():
     """Return the worker process of this process, or None."""
     for each in psutil.Process().children():
         with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
-            if "robomesh.recordings.writing.reindex" in each.cmdline():
+            if "robomesh.recordings.writing.rewrite" in each.cmdline():
                 return each
     return None
 

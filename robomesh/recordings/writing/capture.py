@@ -1,7 +1,7 @@
 """An open recording: the recorded topics of one robot in one MCAP file, complete up to the last write.
 
 The open file is unchunked, so that a reader gets every complete message even if the writer was killed.
-`reindex.index` adds chunks and an index to a closed file.
+`rewrite` adds chunks and an index to a closed file.
 """
 
 import contextlib

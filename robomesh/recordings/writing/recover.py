@@ -1,4 +1,4 @@
-"""Recovery of recordings after a killed writer or a full disk."""
+"""State of a recording's file, and its recovery after a killed writer or a full disk."""
 
 import contextlib
 import itertools
@@ -17,7 +17,7 @@ from robomesh.recordings import records
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.metadata import about_name, end_record, is_about
 from robomesh.recordings.writing.capture import is_being_written
-from robomesh.recordings.writing.reindex import rewrite
+from robomesh.recordings.writing.rewrite import rewrite
 
 
 class State(Enum):

@@ -17,7 +17,7 @@ from robomesh.recordings.names import ROBOT_DESCRIPTION
 from robomesh.recordings.writing import indexed_writer
 from robomesh.recordings.writing.capture import Capture
 from robomesh.recordings.writing.recover import State, close_in_place, is_ours, recover, state_of
-from robomesh.recordings.writing.reindex import index, rewrite
+from robomesh.recordings.writing.rewrite import rewrite
 from tests.recordings import write_recording
 
 ABOUT = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}
@@ -34,7 +34,7 @@ def test_the_usual_decoders_read_every_recorded_topic(tmp_path):
         capture.add(key, row, header, row.schema().SerializeToString(), received_ns=SECOND)
     capture.add_text(ROBOT_DESCRIPTION, "<robot name='臂'/>", header, received_ns=SECOND)
     capture.finish({})
-    index(path)
+    rewrite([path], path)
 
     def read(*factories, topics=None):
         with path.open("rb") as stream:
@@ -86,7 +86,7 @@ def test_closed_file_is_complete_and_an_indexed_one_has_the_same_contents(tmp_pa
     assert state_of(path) is State.CLOSED
     progress = []
     closed = (numbers_in(path), attached_to(path))
-    index(path, progress.append)
+    rewrite([path], path, progress=progress.append)
     assert state_of(path) is State.INDEXED
     assert (numbers_in(path), attached_to(path)) == closed
     assert closed == (list(range(20_000)), {"robot.toml": b'name = "arm"'})
@@ -138,7 +138,7 @@ def test_original_is_kept_if_the_new_file_differs(tmp_path, monkeypatch):
 
     monkeypatch.setattr(indexed_writer.zstandard, "ZstdCompressor", Forgetful)
     with pytest.raises(CaptureError, match=r"cannot be read|not the same"):
-        index(path)
+        rewrite([path], path)
     assert path.read_bytes() == before
     assert [each.name for each in tmp_path.iterdir()] == ["a.mcap"]
 

@@ -1,6 +1,6 @@
 """Rewriting of one or several consecutive closed recordings: 1 MiB zstd chunks, an index, verified, renamed.
 
-`python -m robomesh.recordings.writing.reindex` is a worker process, so that the recorder never waits for it.
+`python -m robomesh.recordings.writing.rewrite` is a worker process, so that the recorder never waits for it.
 It reports its progress, a number from 0 to 1.
 """
 
@@ -30,16 +30,6 @@ _MOST_TAIL_BYTES = 4 << 20
 Progress = Callable[[float], None]
 # Sources, target and metadata.
 _Question = tuple[Sequence[Path], Path, Mapping[str, str]]
-
-
-def index(path: Path, progress: Progress = lambda _: None) -> None:
-    """Rewrite a closed file with an index; keep the original if the new file differs.
-
-    Raises:
-        CaptureError: If the new file differs.
-        OSError: If the disk refuses.
-    """
-    rewrite([path], path, progress=progress)
 
 
 def rewrite(
