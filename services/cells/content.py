@@ -59,7 +59,7 @@ def check_limits(content: schema.CellContent, shapes: Sequence[str]) -> None:
     """Check a client's content against limits that a site file does not have.
 
     Args:
-        meshes: Mesh files that fixtures may use.
+        shapes: Shape files that fixtures may use.
 
     Raises:
         RefusedError: With the fixture and what is wrong with it.

@@ -72,7 +72,7 @@ class CellFile:
         return [cell_content.member_of(each) for each in self.robots(robot)]
 
     def meshes(self) -> list[str]:
-        """Return the mesh files that fixtures may use: those that the site file names."""
+        """Return the shape files that fixtures may use: those that the site file names."""
         return sorted({str(each.mesh) for each in self._written.fixture if each.mesh is not None})
 
     def content(self, robot: str) -> schema.CellContent:

@@ -66,7 +66,7 @@ def answer_robot_requests(
     """Register the request handlers of an arm.
 
     Args:
-        meshes: Returns GLB bytes by the last chunk of their key.
+        shapes: Returns GLB bytes by the last chunk of their key.
         cell_state: Positions of the arms of its cell.
         checks: Check quota of each client, over all arms because one process serves them.
     """

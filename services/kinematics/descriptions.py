@@ -53,7 +53,7 @@ def describe(
     """Return the `description` message of a robot.
 
     Args:
-        meshes: GLB bytes by link name; links without a shape are absent.
+        shapes: GLB bytes by link name; links without a shape are absent.
         base_to_site: (4, 4) placement of the base in the site's frame.
     """
     message = schema.Description(

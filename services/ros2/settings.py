@@ -21,7 +21,7 @@ class Settings:
         site: Site of the service's presence; empty for the first site found.
         metrics: Host and port of the Prometheus endpoint; None for none.
         node: Name of the node in the ROS graph.
-        meshes: Folder for the mesh files that `/robot_description` names.
+        shapes: Folder for the shape files that `/robot_description` names.
     """
 
     domain: int = 0

@@ -46,7 +46,7 @@ _POINTS = 200  # of a mesh's surface; the page compares those of each two parts
 
 
 def mesh(store: Store, folder: Path, request: Json) -> Json:
-    """Convert a mesh file to GLB in the store, in its own units and axes, and summarise it.
+    """Convert a shape file to GLB in the store, in its own units and axes, and summarise it.
 
     If all of the mesh is in missing files, the result is empty and names them.
     """

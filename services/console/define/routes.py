@@ -172,7 +172,7 @@ class Define:
         return JSONResponse({"sha": sha, "size": size})
 
     async def mesh(self, request: Request) -> Response:
-        """Convert a mesh file and summarise it; results are cached."""
+        """Convert a shape file and summarise it; results are cached."""
         asked = await self._json(request, file=str)
         folder = await self._laid_out(asked)
         file = self._file_of(asked)

@@ -1,6 +1,6 @@
 """Confinement of the worker: it may open its draft, the store and program code only.
 
-A mesh file may refer to others (Inline, materials, textures), and a description to its meshes; no reference
+A shape file may refer to others (Inline, materials, textures), and a description to its meshes; no reference
 may open one of the server's own files. Readers check these paths as well; this module covers all of them.
 """
 

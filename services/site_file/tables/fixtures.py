@@ -217,7 +217,7 @@ def fixture_problem(fixtures: tuple[Fixture, ...], links: dict[str, dict[str, bo
 
 
 def _missing_part(mesh: Path, within: Path | None) -> str:
-    """Return a mesh file that this one refers to and that cannot be read; empty if there is none.
+    """Return a shape file that this one refers to and that cannot be read; empty if there is none.
 
     Only the VRML reader goes on without such a file; the others refuse the mesh.
     """
