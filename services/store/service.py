@@ -6,7 +6,7 @@ import fcntl
 import logging
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from functools import partial
 from pathlib import Path
 
@@ -54,7 +54,7 @@ async def serve(session: Session, settings: Settings) -> None:
         round(mib * MIB) for mib in (settings.most_mib, settings.runs_mib, settings.notes_mib)
     )
     store = ProgramStore(folder, most_bytes=most, most_run_bytes=most_of_runs)
-    with await _locked(folder):
+    async with _locked(folder):
         notes = NoteBook(folder, most_bytes=most_of_notes)
         await _Service(session, settings, store, notes, Layouts(folder)).run()
 
@@ -269,7 +269,8 @@ def _reason(version: schema.ProgramVersion, old_name: str) -> Reason:
             return codes.PROGRAMS_SAVED(**values, version=version.number)
 
 
-async def _locked(folder: Path) -> contextlib.AbstractContextManager[None]:
+@contextlib.asynccontextmanager
+async def _locked(folder: Path) -> AsyncIterator[None]:
     """Lock the folder: two services would overwrite each other's versions. A kill releases the lock.
 
     Raises:
@@ -286,15 +287,6 @@ async def _locked(folder: Path) -> contextlib.AbstractContextManager[None]:
                 if time.monotonic() > until_s:
                     raise FolderInUseError(f"{folder}: another store uses this folder") from None
                 await asyncio.sleep(_LOCK_RETRY_S)
-    except BaseException:
-        os.close(file)
-        raise
-    return _closing(file)
-
-
-@contextlib.contextmanager
-def _closing(file: int) -> Iterator[None]:
-    try:
         yield
     finally:
         os.close(file)
