@@ -145,6 +145,13 @@ def test_the_arm_is_drawn_where_the_server_says_that_it_is(open_page):
     assert np.linalg.norm(moved[:3, 3] - drawn[:3, 3]) > 0.05
 
 
+def test_an_invalid_position_marks_only_its_own_field(open_page):
+    page = opened(open_page, "pt500", drawn=False)
+    page.get_by_label("Position of elbow").last.fill("x")
+    expect(page.get_by_label("Position of elbow").last).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_label("Position of shoulder").last).to_have_attribute("aria-invalid", "false")
+
+
 def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
     page = opened(open_page, "pt500", drawn=False)
     settled(page)

@@ -53,7 +53,7 @@ export function PositionsPanel() {
       <div class="sliders grid scroll gap-0-8 pad-0-16">
         {joints.length === 0 && <p class="dim">{d("no_joints")}</p>}
         {joints.map((joint, index) => (
-          <Slider key={index} joint={joint} units={units} />
+          <Slider key={index} joint={joint} index={index} units={units} />
         ))}
       </div>
       <ToolAt />
@@ -61,7 +61,7 @@ export function PositionsPanel() {
   );
 }
 
-function Slider({ joint, units }: { joint: Joint; units: Units }) {
+function Slider({ joint, index, units }: { joint: Joint; index: number; units: Units }) {
   const [lower, upper] = joint.limits;
   const position = positionOf(joint);
   const unit = jointUnit(joint.type, units);
@@ -85,7 +85,7 @@ function Slider({ joint, units }: { joint: Joint; units: Units }) {
       <span class="limit small dim">{numberText(Math.round(upper * 100) / 100)}</span>
       <NumberField
         quiet
-        path=""
+        path={`joint/${index}/position`}
         label={d("position_of", { joint: joint.name })}
         value={position}
         unit={unit}
