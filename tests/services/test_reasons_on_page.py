@@ -27,7 +27,11 @@ HELD = codes.LEASE_HELD(holder="עלי")
 @pytest.fixture(scope="module")
 def module(tmp_path_factory):
     return page_modules.bundle(
-        tmp_path_factory.mktemp("reasons"), reasons="i18n/reasons.ts", texts="i18n/texts.ts"
+        tmp_path_factory.mktemp("reasons"),
+        reasons="i18n/reasons.ts",
+        events="i18n/event-text.ts",
+        state="mesh/state/robot-state.ts",
+        texts="i18n/texts.ts",
     )
 
 
@@ -48,6 +52,12 @@ def test_a_hyphen_of_the_sentence_stays(module):
     assert shown(module, reason)[0] == "'speed': x is −7; must be between -5 and 5"
 
 
+def test_a_number_in_a_line_to_be_typed_stays_plain(module):
+    for text in shown(module, codes.FLOOR_ADVICE(height_mm=-20, below_mm=-20)):
+        assert "−20 mm" in text
+        assert "floor = -20.0" in text
+
+
 def test_a_name_from_right_to_left_is_isolated_also_in_a_cause(module):
     for text in shown(module, codes.PROGRAM_CONTROL_ENDED(HELD)):
         assert "\u2068עלי\u2069" in text
@@ -56,6 +66,11 @@ def test_a_name_from_right_to_left_is_isolated_also_in_a_cause(module):
 
 def test_a_cause_is_in_the_page_s_language(module):
     assert shown(module, codes.PROGRAM_LINE(LIMIT, line=3))[1] == f"第 3 行：{shown(module, LIMIT)[1]}"
+
+
+def test_a_controller_s_work_is_in_the_page_s_language(module):
+    reason = codes.GATEWAY_OCCUPIED(work="the controller of pt600", seconds=0.2)
+    assert shown(module, reason)[1].startswith("pt600 的控制器 ")
 
 
 def test_an_unknown_code_shows_its_english(module):
@@ -72,3 +87,14 @@ def test_seconds_are_counted_down(module):
         "too many attempts: try again in 29 s",
         "尝试次数过多：请在 29 秒后重试",
     ]
+
+
+def test_a_stop_without_a_name_has_it_within_and_at_the_begin_of_a_sentence(module):
+    script = """
+    const since = { seconds: 0n, nanos: 0 };
+    const latched = { code: "stop.latched", severity: 0, values: { by: "", sent: "True" }, timestamp: since };
+    answer([page.stopText({ stop: { by: "", sent: true, since }, activity: 0 }), page.eventText(latched)]);
+    """
+    state, event = page_modules.ask(module, script, None)
+    assert " by an operator without a name" in state
+    assert event.startswith("An operator without a name")

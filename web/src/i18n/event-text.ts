@@ -54,7 +54,8 @@ export function eventText(event: Event): string {
   switch (code) {
     case "stop.latched": {
       const time = stampWhen(event.timestamp);
-      const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by: operatorText(by), time });
+      const who = operatorText(by, "unnamed_operator_first");
+      const text = t(values.sent === "True" ? "event_stop" : "event_stop_unsent", { by: who, time });
       return isSaid(reason) ? `${text} ${t("stop_reason", { reason })}` : text;
     }
     case "note.written": {

@@ -45,7 +45,7 @@ function translated({ code, values, causes }: Reason): string | undefined {
   const shown = Object.fromEntries(
     Object.entries(values).map(([name, value]) => [
       name,
-      message(`reason_value.${name}:${value}`) ?? shownValue(value),
+      wordsOf(name, value) ?? (template.includes(`= {${name}}`) ? isolated(value) : shownValue(value)),
     ]),
   );
   const known = causes.map((cause) => sentence(cause) ?? isolated(cause.text));
@@ -53,7 +53,14 @@ function translated({ code, values, causes }: Reason): string | undefined {
   return placeholders(template).every((name) => shown[name]) ? filled(template, shown, String) : undefined;
 }
 
-/** Return the reason's own sentence, with its values as the page shows them. */
+/** Return the catalogue's words for a value, whose last word may be a robot; undefined: it has none. */
+function wordsOf(name: string, value: string): string | undefined {
+  const key = `reason_value.${name}:${value}`;
+  const words = message(key) ?? message(key.replace(/\S+$/, "{robot}"));
+  return words && filled(words, { robot: value.split(" ").at(-1) ?? "" });
+}
+
+/** Return the reason's own sentence, with its values as the page shows them; a line to be typed keeps its numbers. */
 function inEnglish(reason: Reason): string | undefined {
   const changed = new Map(valuesOf(reason).map((value) => [value, shownValue(value)] as const));
   for (const [value, shown] of changed) if (value === shown) changed.delete(value);
@@ -61,7 +68,7 @@ function inEnglish(reason: Reason): string | undefined {
   if (changed.size === 0) return text;
   const longestFirst = [...changed.keys()].sort((one, other) => other.length - one.length);
   const any = longestFirst.map((value) => value.replace(/[\\^$.*+?()[\]{}|]/g, "\\$&")).join("|");
-  return text?.replace(new RegExp(`(?<![\\w.])(?:${any})(?!\\d)`, "g"), (value) => changed.get(value) ?? value);
+  return text?.replace(new RegExp(`(?<![\\w.]|= (?=-))(?:${any})(?!\\d)`, "g"), (value) => changed.get(value) ?? value);
 }
 
 const valuesOf = ({ values, causes }: Reason): string[] => [...Object.values(values), ...causes.flatMap(valuesOf)];
