@@ -62,10 +62,11 @@ const OPERATOR_NAME = /^[A-Za-z0-9][A-Za-z0-9_.-]*$/;
 export const operator = signal(localStorage.getItem(OPERATOR) ?? "");
 export const controlNotice = signal<Notice | null>(null);
 
+/** Why control was released before the answer came. */
+type Unwanted = { text: string; cause: Cause | undefined } | null;
 type State =
   | { phase: "none" }
-  /** `unwanted`: why control was released before the answer came. */
-  | { phase: "asking"; unwanted: { text: string; cause: Cause | undefined } | null }
+  | { phase: "asking"; unwanted: Unwanted }
   | { phase: "held"; lease: HeldLease; offeredTo: string }
   /** `explained`: the message gives the reason; `successor`: the lease that replaced this one. */
   | { phase: "lost"; lease: HeldLease; offeredTo: string; explained: boolean; successor: string };
@@ -75,9 +76,9 @@ type State =
  *     phase    this tab                                             steps
  *     ------   --------------------------------------------------   -----------------------------
  *     none     has no lease                                         ask
- *     asking   waits for the answer to its request                  grant; end: it was refused
- *     held     has a lease, and renews it                           renew, lose; ask; end: it was released
- *     lost     shows why its lease ended without a release, until   ask; end: control changed
+ *     asking   waits for the answer to its request                  drop, grant; end: it was refused
+ *     held     has a lease, and renews it                           renew, offer, lose; ask; end: it was released
+ *     lost     shows why its lease ended without a release, until   explain; ask; end: control changed
  *              control changes again                                again
  */
 class Control {
@@ -102,12 +103,27 @@ class Control {
 
   renewIn(delayMs: number): void {
     clearTimeout(this.renewal);
-    this.renewal = setTimeout(renew, delayMs);
+    this.renewal = setTimeout(askRenewal, delayMs);
+  }
+
+  drop(unwanted: Unwanted): void {
+    if (this.state.peek().phase === "asking") this.become({ phase: "asking", unwanted });
+  }
+
+  offer(offeredTo: string): void {
+    const state = this.state.peek();
+    if (state.phase === "held") this.become({ ...state, offeredTo });
   }
 
   lose(explained: boolean): void {
     const state = this.state.peek();
     if (state.phase === "held") this.become({ ...state, phase: "lost", explained, successor: "" });
+  }
+
+  /** @param successor The lease that the gateway published; the first one stays. */
+  explain(successor: string): void {
+    const state = this.state.peek();
+    if (state.phase === "lost") this.become({ ...state, explained: true, successor: state.successor || successor });
   }
 
   end(): void {
@@ -174,7 +190,7 @@ async function begin(robotKey: string, action: Action, reason = ""): Promise<voi
   if (before) await giveBack(before);
   controlNotice.value = { kind: "busy", text: t("taking") };
   const requestedAt = performance.now();
-  let unwanted: { text: string; cause: Cause | undefined } | null = null;
+  let unwanted: Unwanted = null;
   try {
     const answer = await askLease(robotKey, who, action, { reason });
     const state = control.state.peek();
@@ -200,7 +216,7 @@ export async function offer(to: string | null): Promise<void> {
   const state = control.state.peek();
   if (state.phase !== "held") return;
   const mine = state.lease;
-  state.offeredTo = to ?? "";
+  control.offer(to ?? "");
   const values = { lease: mine.lease, to: to ?? mine.operator };
   const done = to ? t("offered", { name: to }) : t("withdrawn");
   await say(mine.robotKey, mine.operator, Action.OFFER, values, done, "not_done");
@@ -236,7 +252,7 @@ function leaseFrom(robotKey: string, who: string, answer: LeaseAnswer, requested
   };
 }
 
-async function renew(): Promise<void> {
+async function askRenewal(): Promise<void> {
   const mine = heldLease.value;
   if (!mine) return;
   const requestedAt = performance.now();
@@ -269,8 +285,8 @@ const releaseHidden = () => release(t("released_hidden"), Cause.HIDDEN);
 
 /** Release control if this tab has it; every page shows the cause. */
 export async function release(text: string = t("released"), cause?: Cause): Promise<void> {
+  control.drop({ text, cause });
   const state = control.state.peek();
-  if (state.phase === "asking") state.unwanted = { text, cause };
   if (state.phase !== "held") return;
   control.end();
   await giveBack(state.lease, text, cause);
@@ -300,10 +316,9 @@ export function handleLease(robotKey: string, lease: Lease): void {
   if (state.phase !== "lost") return;
   if (!state.explained && controlNotice.value?.kind === "lost")
     controlNotice.value = explanation(lease, state.offeredTo);
-  state.explained = true;
   const now = `${lease.holder} ${stampMs(lease.since)}`;
-  state.successor ||= now;
-  if (state.successor === now) return;
+  control.explain(now);
+  if (!state.successor || state.successor === now) return;
   control.end();
   if (controlNotice.value?.kind === "lost") controlNotice.value = null;
 }
