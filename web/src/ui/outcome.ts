@@ -7,7 +7,7 @@ import type { Notice } from "../mesh/control/control";
 /** Return the outcome of the newest action, and a function that performs one.
  *
  * @param refusal Makes the message of a refusal from its reason. */
-export function useOutcome(refusal: (text: string) => string) {
+export function useOutcome(refusal = (text: string) => text) {
   const [notice, setNotice] = useState<Notice | null>(null);
   const [isBusy, setBusy] = useState(false);
   /** @param busy Message while the work runs, such as "Saving…"; "": none.

@@ -1,4 +1,10 @@
-// Axes of every plot, in the colours of the theme.
+// Axes and curves of every plot, in the colours of the theme.
+
+/** The number of colours. */
+export const CURVES = 7;
+
+/** Return the name of a curve's colour. */
+export const curveColour = (index: number): string => `--curve-${(index % CURVES) + 1}`;
 
 export interface PlotAppearance {
   /** Return a colour of the theme by its name. */

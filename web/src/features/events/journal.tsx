@@ -17,6 +17,7 @@ import { Button } from "../../ui/button";
 import { Choice, Toggle } from "../../ui/choice";
 import { Mark, outcomeMark, severityMark } from "../../ui/event-mark";
 import { NoticeLine } from "../../ui/notice-line";
+import { useOutcome } from "../../ui/outcome";
 import { programLink } from "../../ui/route";
 import { Select } from "../../ui/select";
 import { TextInput } from "../../ui/text-input";
@@ -324,12 +325,12 @@ function Details({ entry, withdrawn, close }: { entry: Entry; withdrawn: boolean
 
 /** A button that withdraws a note; the list then shows it struck through. */
 function Withdraw({ robotKey, note }: { robotKey: string; note: Note }) {
-  const [problem, setProblem] = useState("");
-  const withdraw = () => withdrawNote(robotKey, note).catch((error: unknown) => setProblem(reasonOf(error)));
+  const { notice, perform } = useOutcome();
+  const withdraw = () => perform("", async () => void (await withdrawNote(robotKey, note)));
   return (
     <>
       <Button quiet destructive text={n("withdraw")} title={n("withdraw_hint")} onClick={() => void withdraw()} />
-      {problem && <NoticeLine notice={{ kind: "refused", text: problem }} />}
+      {notice && <NoticeLine notice={notice} />}
     </>
   );
 }

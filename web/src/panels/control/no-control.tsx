@@ -3,8 +3,8 @@
 import { useState } from "preact/hooks";
 import { accountText as a } from "../../i18n/texts";
 import { isMonitor, mayAct, me, unlock } from "../../mesh/console/account";
-import { reasonOf } from "../../mesh/console/connection";
 import { Button } from "../../ui/button";
+import { useOutcome } from "../../ui/outcome";
 import { PasswordField } from "../../ui/password-field";
 import { submit } from "../../ui/submit";
 import "../account-form.css";
@@ -16,21 +16,13 @@ export function mayNotCommand(): boolean {
 
 export function NoControl() {
   const [password, setPassword] = useState("");
-  const [problem, setProblem] = useState("");
-  const [busy, setBusy] = useState(false);
+  const { notice, isBusy, perform } = useOutcome();
   if (isMonitor.value)
     return <p class="no-control pad-8-16">{a("monitor_only", { account: me.value?.account ?? "" })}</p>;
   const send = async () => {
-    if (busy) return;
-    setProblem("");
-    setBusy(true);
-    try {
-      await unlock(password);
-    } catch (error) {
-      setProblem(reasonOf(error));
-    }
+    if (isBusy) return;
+    await perform("", async () => void (await unlock(password)));
     setPassword("");
-    setBusy(false);
   };
   return (
     <form class="no-control pad-8-16" aria-label={a("unlock")} onSubmit={submit(() => void send())}>
@@ -38,9 +30,9 @@ export function NoControl() {
       <input type="text" name="username" autocomplete="username" value={me.value?.account} readOnly hidden />
       <PasswordField label={a("password")} kind="current-password" value={password} set={setPassword} />
       <p class="sign-in-problem" role="alert">
-        {problem}
+        {notice?.text}
       </p>
-      <Button primary text={a(busy ? "unlocking" : "unlock")} type="submit" disabled={busy} />
+      <Button primary text={a(isBusy ? "unlocking" : "unlock")} type="submit" disabled={isBusy} />
     </form>
   );
 }

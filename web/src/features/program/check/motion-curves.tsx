@@ -5,13 +5,13 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { jointTitle, jointUnit } from "../../../i18n/format";
 import { programText as p } from "../../../i18n/texts";
-import { plotAppearance } from "../../../ui/plot-appearance";
+import { CurveMark } from "../../../ui/curve-mark";
+import { curveColour, plotAppearance } from "../../../ui/plot-appearance";
 import { theme } from "../../../ui/theme";
 import { moment, path } from "../motion/checked-motion";
 import { description } from "../motion/program-robot";
 import { showMoment } from "../motion/scene-overlay";
 
-const CURVES = ["--curve-1", "--curve-2", "--curve-3", "--curve-4", "--curve-5", "--curve-6", "--curve-7"];
 const MOST_POINTS = 2000; // more than there are pixels
 const CLEARANCE = "clearance";
 
@@ -56,7 +56,7 @@ export function MotionCurves() {
           ...joints.map((joint, i) => ({
             label: jointTitle(joint),
             scale: unitOf(i),
-            stroke: colour(CURVES[i % CURVES.length] ?? "--text"),
+            stroke: colour(curveColour(i)),
             width: 1.5,
             points: { show: false },
           })),
@@ -121,7 +121,7 @@ export function MotionCurves() {
       <div class="legend flex wrap small dim gap-0-16 pad-0-16">
         {joints.map((joint, i) => (
           <span key={joint.name}>
-            <span class="curve" style={{ background: `var(${CURVES[i % CURVES.length]})` }} aria-hidden="true" />
+            <CurveMark index={i} />
             {jointTitle(joint)}
           </span>
         ))}

@@ -8,14 +8,14 @@ import type { SeriesAnswer_Series as Series } from "../../../gen/robomesh_pb";
 import { DASH, fixed } from "../../../i18n/format";
 import { momentText } from "../../../i18n/recording-format";
 import { commonOf, labelOf, shownUnit } from "../../../i18n/units";
-import { plotAppearance } from "../../../ui/plot-appearance";
+import { CurveMark } from "../../../ui/curve-mark";
+import { curveColour, plotAppearance } from "../../../ui/plot-appearance";
 import { theme } from "../../../ui/theme";
 import type { Window } from "./recorder-requests";
 
 const GAP = 3; // a gap is longer than 3 usual intervals, and
 const GAP_S = 1; // at least so long
 const CLICK_PX = 4;
-export const CURVES = 7;
 
 /** A curve: of the first recording, or of the second, `shift` s later there. */
 export interface Curve {
@@ -59,7 +59,7 @@ export function Chart(props: {
         series: [
           {},
           ...curves.flatMap(({ colour: index, second }) => {
-            const stroke = colour(`--curve-${(index % CURVES) + 1}`);
+            const stroke = colour(curveColour(index));
             const dash = second ? { dash: [6, 4] } : {};
             const look = { scale: "y", stroke, width: 1.5, points: { show: false }, ...dash };
             return [look, look];
@@ -68,7 +68,7 @@ export function Chart(props: {
         // The line crosses every value between the lowest and the highest of a segment.
         bands: curves.map(({ colour: index }, i) => ({
           series: [2 * i + 2, 2 * i + 1] as [number, number],
-          fill: `${colour(`--curve-${(index % CURVES) + 1}`)}55`,
+          fill: `${colour(curveColour(index))}55`,
         })),
         hooks: {
           ready: [(made) => made.over.append(cursor)],
@@ -134,11 +134,7 @@ function Named({ curve, label, moment }: { curve: Curve; label: string; moment: 
   const value = valueAt(series, moment.value + shift, holds);
   return (
     <span>
-      <span
-        class={`curve ${second ? "dashed" : ""}`}
-        style={{ background: `var(--curve-${(colour % CURVES) + 1})` }}
-        aria-hidden="true"
-      />
+      <CurveMark index={colour} dash={second ? "dashed" : ""} />
       <span title={series.name}>{label}</span>
       {/* No output element: a screen reader would say each value as it plays. */}
       <span class="figure">

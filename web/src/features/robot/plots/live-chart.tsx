@@ -7,7 +7,7 @@ import { dateOf, timeOfDay } from "../../../i18n/format";
 import { plotsText as p } from "../../../i18n/texts";
 import type { shownUnit } from "../../../i18n/units";
 import { ageClock } from "../../../mesh/console/age-clock";
-import { plotAppearance } from "../../../ui/plot-appearance";
+import { CURVES, curveColour, plotAppearance } from "../../../ui/plot-appearance";
 import { theme } from "../../../ui/theme";
 import type { Columns } from "./plot-buckets";
 import { Buckets, columnsOf } from "./plot-buckets";
@@ -15,7 +15,6 @@ import type { PlotFeed, Span } from "./plot-feed";
 import { LIVE_S } from "./plot-feed";
 
 const DRAW_MS = 200;
-const CURVES = 7;
 const DASHES = [[], [6, 4], [2, 3]];
 const CLICK_PX = 6;
 const NARROWEST_S = 0.2;
@@ -107,7 +106,7 @@ export function LiveChart(props: {
           ...curves.flatMap(({ unit }, i) => {
             const look = {
               scale: scaleOf(unit.unit),
-              stroke: colour(`--curve-${(i % CURVES) + 1}`),
+              stroke: colour(curveColour(i)),
               dash: DASHES[Math.floor(i / CURVES) % DASHES.length] ?? [],
               width: 1.5,
               points: { show: false },
@@ -118,7 +117,7 @@ export function LiveChart(props: {
         // The line crosses every value between the lowest and the highest of a column.
         bands: curves.map((_, i) => ({
           series: [2 * i + 2, 2 * i + 1] as [number, number],
-          fill: `${colour(`--curve-${(i % CURVES) + 1}`)}55`,
+          fill: `${colour(curveColour(i))}55`,
         })),
         hooks: {
           drawClear: [(made) => drawMissing(made, latest.current, shown, colour, false)],

@@ -14,9 +14,11 @@ import { ValueChoice } from "../../../panels/value-choice";
 import { jointsTopic } from "../../../scene/topic-selection";
 import { Button } from "../../../ui/button";
 import { Toggle } from "../../../ui/choice";
+import { CurveMark } from "../../../ui/curve-mark";
 import type { Plot } from "../../../ui/layout";
 import { MOST_FIELDS, MOST_PLOTS, RANGES } from "../../../ui/layout";
 import { Panel } from "../../../ui/panel";
+import { CURVES } from "../../../ui/plot-appearance";
 import { Select } from "../../../ui/select";
 import type { Frozen, Shown } from "./live-chart";
 import { LiveChart, missingOf } from "./live-chart";
@@ -24,8 +26,7 @@ import type { Past } from "./plot-feed";
 import { LIVE_S, PlotFeed } from "./plot-feed";
 import "./plots-panel.css";
 
-const CURVES = 7;
-const DASHES = ["", "dashed", "dotted"];
+const DASHES = ["", "dashed", "dotted"] as const;
 const LOOK_MS = 1000;
 
 export function PlotsPanel(props: {
@@ -233,7 +234,7 @@ function Legend(props: {
         const sent = feed.has(name);
         return (
           <li key={name} title={sent ? name : `${name}: ${p("not_sent_hint")}`}>
-            <CurveMark index={i} />
+            <CurveMark index={i} dash={DASHES[Math.floor(i / CURVES) % DASHES.length]} />
             {valueText(name, props.common, props.description)}
             <span class={`figure ${sent && value === null ? "absent" : ""}`}>
               {!sent ? p("not_sent") : value === null ? DASH : withUnit(fixed(value * factor, decimals), unit)}
@@ -242,13 +243,6 @@ function Legend(props: {
         );
       })}
     </ul>
-  );
-}
-
-export function CurveMark({ index }: { index: number }) {
-  const dash = DASHES[Math.floor(index / CURVES) % DASHES.length];
-  return (
-    <span class={`curve ${dash}`} style={{ background: `var(--curve-${(index % CURVES) + 1})` }} aria-hidden="true" />
   );
 }
 
