@@ -211,7 +211,7 @@ function Banners() {
     <>
       {/* Over the page: their appearance must not move a control. */}
       <div class="over-page banners">
-        {lost === 0 && <div class="banner connecting">{t("connecting")}</div>}
+        {lost === 0 && <div class="banner">{t("connecting")}</div>}
         {lost !== null && lost > 0 && (
           <Warning as="div" class="banner warning" role="alert" text={t("reconnecting", { time: whenText(lost) })} />
         )}

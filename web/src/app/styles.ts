@@ -28,6 +28,5 @@ import "../features/robot/events/events-panel.css";
 import "../features/robot/events/link-facts.css";
 import "../ui/plot.css";
 import "../features/robot/camera-panel.css";
-import "../features/robot/low-bandwidth.css";
 import "./breakpoints.css";
 import "./touch.css";

@@ -66,7 +66,7 @@ export function AlarmLine(props: {
       <div class="alarm-text">
         {title && <strong>{title}</strong>}
         {!title && <strong lang="en">{text}</strong>}
-        {advice && <span class="alarm-advice">{e("advice", { text: advice })}</span>}
+        {advice && <span>{e("advice", { text: advice })}</span>}
         {title && (
           <span class="dim small">
             {e("in_its_words")} <span lang="en">{text}</span>

@@ -17,7 +17,7 @@ export function RunningReplays() {
   const shown = [...states.values()].filter((latest) => !isStale("replay", ageOf(latest)));
   if (shown.length === 0) return null;
   return (
-    <section class="site replays" aria-label={r("replays")}>
+    <section class="site" aria-label={r("replays")}>
       <div class="site-head flex wrap baseline gap-16">
         <h2>{r("replays")}</h2>
         <span class="dim small">{r("replays_words")}</span>

@@ -46,7 +46,7 @@ export function RunPanel(props: { robotKey: string; controller: ControllerState 
   return (
     <Panel name="run-panel" title={p("run")}>
       <div class="run-row flex wrap gap-8 pad-0-16-8">
-        <button class="action primary run" data-moves disabled={why !== "" || busy} title={why} onClick={run}>
+        <button class="action primary" data-moves disabled={why !== "" || busy} title={why} onClick={run}>
           {p("run_named", { name })}
         </button>
       </div>

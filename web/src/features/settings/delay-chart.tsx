@@ -22,9 +22,9 @@ export function DelayChart({ hops }: { hops: readonly Hop[] }) {
                 <span>{s("hop", { sender: hop.sender, receiver: hop.receiver })}</span>
                 <span class="hop-bar" aria-hidden="true">
                   <span class="hop-most" style={{ width: share(hop.p99S) }} />
-                  <span class="hop-half" style={{ width: share(hop.p50S) }} />
+                  <span style={{ width: share(hop.p50S) }} />
                 </span>
-                <span class="hop-values">
+                <span>
                   {s("half")} {milliseconds(hop.p50S)}, {s("most")} {milliseconds(hop.p99S)}
                 </span>
               </li>

@@ -97,7 +97,7 @@ function PlanState({ rows }: { rows: readonly PairRow[] }) {
       {isPlanned.value && rows.length > 0 && (
         <>
           <p class={touching ? "problem-word" : "small"}>
-            <span class={`shape ${touching ? "warning" : "info"}`} aria-hidden="true" />
+            <span class={`shape ${touching ? "warning" : ""}`} aria-hidden="true" />
             {touching === 0
               ? d("plan_free")
               : touching === 1

@@ -75,7 +75,7 @@ export function Player({ first, second }: { first: RecordingName; second: Record
           </a>
           <h1>{info.value?.name || first.file}</h1>
           <ReplayTag robot={info.value?.robot || (state?.ofRobot ?? "")} start={info.value ? startMs(info.value) : 0} />
-          <span class="replay-words dim small">{r("replay_words")}</span>
+          <span class="dim small">{r("replay_words")}</span>
           {info.value?.problem && <Trouble text={reasonText(info.value.problemReason, info.value.problem)} />}
           {info.problem && <Trouble text={r("info_refused", { text: info.problem })} />}
         </div>

@@ -142,7 +142,7 @@ function PlotCard(props: {
             choose={(each) => props.change({ seconds: Number(each) })}
           />
           <Toggle text={p("fields")} label={p("fields_of", { number })} on={choosing} set={setChoosing} />
-          <button class="quiet plot-remove" aria-label={p("remove", { number })} onClick={() => props.change(null)}>
+          <button class="quiet" aria-label={p("remove", { number })} onClick={() => props.change(null)}>
             <span aria-hidden="true">×</span>
           </button>
         </div>
