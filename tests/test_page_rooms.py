@@ -21,8 +21,6 @@ LAYERS = (
     ("gen",),
 )
 MOST_MODULES = 12
-# Each of its modules is one component.
-UNDIVIDED = {"ui"}
 IMPORT = re.compile(r'\b(?:from |import |import\(|URL\()"(\.[^"]+)"')
 
 
@@ -68,6 +66,6 @@ def test_no_rooms_import_each_other_in_a_circle():
 
 
 def test_a_room_has_few_modules():
-    count = Counter(module.parent for module in imports() if module.parts[0] not in UNDIVIDED)
+    count = Counter(module.parent for module in imports())
     assert count
     assert {str(room): many for room, many in count.items() if many > MOST_MODULES} == {}

@@ -29,7 +29,9 @@ BOX = {"left": 100, "right": 136, "top": 50, "bottom": 82}
 def module(tmp_path_factory):
     """Return the path of the page's modules as one file for Node."""
     return page_modules.bundle(
-        tmp_path_factory.mktemp("hold"), hold="ui/hold-pointer.ts", step="features/robot/motion/tool-step.ts"
+        tmp_path_factory.mktemp("hold"),
+        hold="ui/hold/hold-pointer.ts",
+        step="features/robot/motion/tool-step.ts",
     )
 
 

@@ -53,7 +53,7 @@ def module(tmp_path_factory):
         values="mesh/state/values.ts",
         connection="mesh/console/connection.ts",
         gen="gen/robomesh_pb.ts",
-        layout="ui/layout.ts",
+        layout="ui/page/layout.ts",
         buckets="features/robot/plots/plot-buckets.ts",
         pb=build_page.MODULES / "@bufbuild/protobuf/dist/esm/index.js",
     )

@@ -65,8 +65,8 @@ def test_activity_is_its_number():
 def test_the_page_shows_numbers(tmp_path):
     module = page_modules.bundle(
         tmp_path,
-        mark="ui/event-mark.tsx",
-        priority="ui/priority-mark.tsx",
+        mark="ui/marks/event-mark.tsx",
+        priority="ui/marks/priority-mark.tsx",
         format="i18n/format.ts",
     )
     shown = page_modules.run(

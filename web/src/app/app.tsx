@@ -18,11 +18,11 @@ import { canBe, isReplay } from "../mesh/state/robot-name";
 import { stopRequestText } from "../mesh/state/robot-state";
 import { useTopic } from "../mesh/state/topics";
 import { RobotNotFound } from "../panels/robot-not-found";
-import { Button } from "../ui/button";
-import { guardMovedControls } from "../ui/moved-controls";
-import { NoticeLine } from "../ui/notice-line";
-import { type Route, robotOf, route } from "../ui/route";
-import { Warning } from "../ui/warning";
+import { guardMovedControls } from "../ui/hold/moved-controls";
+import { Button } from "../ui/inputs/button";
+import { Warning } from "../ui/marks/warning";
+import { type Route, robotOf, route } from "../ui/page/route";
+import { NoticeLine } from "../ui/panel/notice-line";
 import { Bar } from "./bar";
 
 /** Return a component that loads its page when it is first shown. */

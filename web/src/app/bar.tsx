@@ -6,10 +6,10 @@ import { AccountMenu } from "../features/account/account-menu";
 import { AlarmBadge } from "../features/events/alarm-badge";
 import { switchLanguage, t } from "../i18n/texts";
 import { mustSignIn } from "../mesh/console/account";
-import { useDismissal } from "../ui/dismissal";
-import type { Route } from "../ui/route";
-import { robotOf, route } from "../ui/route";
-import { switchTheme, theme } from "../ui/theme";
+import type { Route } from "../ui/page/route";
+import { robotOf, route } from "../ui/page/route";
+import { switchTheme, theme } from "../ui/page/theme";
+import { useDismissal } from "../ui/panel/dismissal";
 import { RobotSwitcher } from "./robot-switcher";
 
 const PAGES = ["fleet", "wall", "recordings", "events", "define", "settings"] as const;

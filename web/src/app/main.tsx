@@ -7,7 +7,7 @@ import { fetchAccount, reportActivity, signedOut } from "../mesh/console/account
 import { keepConnected } from "../mesh/console/connection";
 import { followThisTab } from "../mesh/control/control";
 import { renewWhileBusy } from "../mesh/control/renewal";
-import { applyTheme } from "../ui/theme";
+import { applyTheme } from "../ui/page/theme";
 import { App } from "./app";
 
 isolateTexts();

@@ -9,9 +9,9 @@ import { robotSnapshot, useFleetSnapshots } from "../mesh/state/robot-snapshots"
 import { stateWord } from "../mesh/state/robot-state";
 import { ageOf } from "../mesh/state/staleness";
 import { now } from "../mesh/state/topics";
-import { useDismissal } from "../ui/dismissal";
-import { programLink, robotLink } from "../ui/route";
-import { State } from "../ui/state";
+import { State } from "../ui/marks/state";
+import { programLink, robotLink } from "../ui/page/route";
+import { useDismissal } from "../ui/panel/dismissal";
 import "./robot-switcher.css";
 
 const SETTLED_MS = 2000;

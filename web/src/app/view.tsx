@@ -6,11 +6,11 @@ import { ViewPage } from "../features/view/view-page";
 import { isolateTexts } from "../i18n/text-isolation";
 import { isLanguage, showFirstLanguage } from "../i18n/texts";
 import { followView } from "../mesh/console/view-stream";
-import { applyTheme, theme } from "../ui/theme";
+import { applyTheme, theme } from "../ui/page/theme";
 import "../ui/tokens.css";
 import "./base.css";
-import "../ui/state.css";
-import "../ui/replay.css";
+import "../ui/marks/state.css";
+import "../ui/marks/replay.css";
 import "../features/view/view-page.css";
 
 const query = new URLSearchParams(location.search);

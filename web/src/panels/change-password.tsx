@@ -6,9 +6,9 @@ import type { Me } from "../mesh/console/account";
 import { me, post } from "../mesh/console/account";
 import { reasonOf } from "../mesh/console/connection";
 import { RefusedRequest } from "../mesh/console/refusal";
-import { Button } from "../ui/button";
-import { PasswordField } from "../ui/password-field";
-import { submit } from "../ui/submit";
+import { Button } from "../ui/inputs/button";
+import { PasswordField } from "../ui/inputs/password-field";
+import { submit } from "../ui/inputs/submit";
 import "./account-form.css";
 
 export function ChangePassword({ close }: { close: () => void }) {

@@ -6,8 +6,8 @@ import { fixed, jointTitle, jointUnit, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { distanceText, ownLevel, pairText, useClearanceLevel } from "../mesh/state/clearance";
 import type { Level } from "../mesh/state/robot-state";
-import { Unit } from "../ui/unit";
-import { Warning } from "../ui/warning";
+import { Unit } from "../ui/marks/unit";
+import { Warning } from "../ui/marks/warning";
 
 // Values at which a bar is full.
 const FULL_CLEARANCE_M = 0.3;

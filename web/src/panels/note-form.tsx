@@ -9,11 +9,11 @@ import { operator, setOperator } from "../mesh/control/control";
 import { asker } from "../mesh/services/alarms";
 import type { NoteTime } from "../mesh/services/notes";
 import { LONGEST_TEXT, writeNote } from "../mesh/services/notes";
-import { Button } from "../ui/button";
-import { NoticeLine } from "../ui/notice-line";
-import { useOutcome } from "../ui/outcome";
-import { submit } from "../ui/submit";
-import { TextInput } from "../ui/text-input";
+import { Button } from "../ui/inputs/button";
+import { submit } from "../ui/inputs/submit";
+import { TextInput } from "../ui/inputs/text-input";
+import { NoticeLine } from "../ui/panel/notice-line";
+import { useOutcome } from "../ui/panel/outcome";
 import "./note-form.css";
 
 export function NoteForm(props: {

@@ -6,7 +6,7 @@ import { Event_Severity as Severity } from "../gen/robomesh_pb";
 import { stampFull, stampMs, stampWhen } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { DISOBEYED, disobeys, msBefore } from "../mesh/state/robot-state";
-import { Button } from "../ui/button";
+import { Button } from "../ui/inputs/button";
 
 const SHOWN_MS = 600_000; // unless it is dismissed before
 

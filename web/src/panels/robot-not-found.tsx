@@ -6,7 +6,7 @@ import { hello, lostAt } from "../mesh/console/connection";
 import { fleetRobots } from "../mesh/state/known-robots";
 import type { RobotName } from "../mesh/state/robot-name";
 import { isReplay } from "../mesh/state/robot-name";
-import { robotLink } from "../ui/route";
+import { robotLink } from "../ui/page/route";
 
 /** How long a console may take to know every robot, just after its start. */
 const SEARCH_MS = 4000;

@@ -6,9 +6,9 @@ import { fixed, rollPitchYaw, toDegrees } from "../i18n/format";
 import { t } from "../i18n/texts";
 import { ageOf, isStale } from "../mesh/state/staleness";
 import type { Latest } from "../mesh/state/topics";
-import { Panel } from "../ui/panel";
-import { Age } from "../ui/state";
-import { Unit } from "../ui/unit";
+import { Age } from "../ui/marks/state";
+import { Unit } from "../ui/marks/unit";
+import { Panel } from "../ui/panel/panel";
 import { JointLimitsPanel } from "./joint-limits-panel";
 
 export const POSE_AXES = ["x", "y", "z", "roll", "pitch", "yaw"] as const;

@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import type { NameIn } from "../i18n/texts";
 import { recordingsText as r } from "../i18n/texts";
 import { labelOf } from "../i18n/units";
-import { TextInput } from "../ui/text-input";
+import { TextInput } from "../ui/inputs/text-input";
 import "./value-choice.css";
 
 /** The most wanted values, by topic. */

@@ -10,8 +10,8 @@ import type { Sample } from "../mesh/console/connection";
 import { watch } from "../mesh/console/connection";
 import type { Picture } from "../mesh/control/display-freshness";
 import { floorOf } from "../mesh/state/clearance";
-import type { Camera } from "../ui/layout";
-import type { Theme } from "../ui/theme";
+import type { Camera } from "../ui/page/layout";
+import type { Theme } from "../ui/page/theme";
 import { DrawBudget, qualities } from "./canvas/draw-budget";
 import { DrawLoop } from "./canvas/draw-loop";
 import {

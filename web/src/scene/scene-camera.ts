@@ -4,7 +4,7 @@ import { create } from "@bufbuild/protobuf";
 import * as THREE from "three";
 import type { View, Vector3 as ViewPoint } from "../gen/robomesh_pb";
 import { View_Projection, ViewSchema } from "../gen/robomesh_pb";
-import type { Camera } from "../ui/layout";
+import type { Camera } from "../ui/page/layout";
 import { Viewpoint } from "./canvas/viewpoint";
 
 const REST_INTERVAL_MS = 500;

@@ -5,8 +5,8 @@ import { accountText as a, textIn } from "../../i18n/texts";
 import { commandSuspended, isMonitor, me, signOut } from "../../mesh/console/account";
 import { hello } from "../../mesh/console/connection";
 import { ChangePassword } from "../../panels/change-password";
-import { Button } from "../../ui/button";
-import { useDismissal } from "../../ui/dismissal";
+import { Button } from "../../ui/inputs/button";
+import { useDismissal } from "../../ui/panel/dismissal";
 import "./account-menu.css";
 
 export function AccountMenu() {

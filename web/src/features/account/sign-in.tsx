@@ -5,11 +5,11 @@ import { reasonText, withValue } from "../../i18n/reasons";
 import { accountText as a, switchLanguage, t, textIn } from "../../i18n/texts";
 import { endedBy, me, signIn } from "../../mesh/console/account";
 import { RefusedRequest } from "../../mesh/console/refusal";
-import { Button } from "../../ui/button";
-import { PasswordField } from "../../ui/password-field";
-import { submit } from "../../ui/submit";
-import { TextInput } from "../../ui/text-input";
-import { switchTheme, theme } from "../../ui/theme";
+import { Button } from "../../ui/inputs/button";
+import { PasswordField } from "../../ui/inputs/password-field";
+import { submit } from "../../ui/inputs/submit";
+import { TextInput } from "../../ui/inputs/text-input";
+import { switchTheme, theme } from "../../ui/page/theme";
 import "../../panels/account-form.css";
 import "./sign-in.css";
 

@@ -3,7 +3,7 @@
 import type { CellChange, CellFixture, CellFloor, Vector3 } from "../../gen/robomesh_pb";
 import { CellChange_Kind as Kind } from "../../gen/robomesh_pb";
 import { cellText as c } from "../../i18n/texts";
-import { numberText } from "../../ui/number-text";
+import { numberText } from "../../ui/inputs/number-text";
 
 /** The unit in which people read and type a quantity, and its factor from SI. */
 export const UNITS = { length: { unit: "mm", factor: 1000 }, angle: { unit: "°", factor: 180 / Math.PI } } as const;

@@ -6,9 +6,9 @@ import { reasonText } from "../../i18n/reasons";
 import { cellText as c } from "../../i18n/texts";
 import { isEngineer } from "../../mesh/console/account";
 import { reasonOf } from "../../mesh/console/connection";
-import { Button } from "../../ui/button";
-import { Panel } from "../../ui/panel";
-import { ReasonForm } from "../../ui/reason-form";
+import { Button } from "../../ui/inputs/button";
+import { ReasonForm } from "../../ui/inputs/reason-form";
+import { Panel } from "../../ui/panel/panel";
 import {
   account,
   add,

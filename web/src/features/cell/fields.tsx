@@ -3,8 +3,8 @@
 import type { ComponentChildren } from "preact";
 import { useId } from "preact/hooks";
 import type { Vector3 } from "../../gen/robomesh_pb";
-import { NumberInput } from "../../ui/number-input";
-import { numberText } from "../../ui/number-text";
+import { NumberInput } from "../../ui/inputs/number-input";
+import { numberText } from "../../ui/inputs/number-text";
 import { mayEdit } from "./cell-draft";
 import { type Quantity, UNITS } from "./cell-text";
 

@@ -3,9 +3,9 @@
 import { useId, useState } from "preact/hooks";
 import type { CellFixture, CellFloor } from "../../gen/robomesh_pb";
 import { cellText as c } from "../../i18n/texts";
-import { Button } from "../../ui/button";
-import { Choice, Toggle } from "../../ui/choice";
-import { Panel } from "../../ui/panel";
+import { Button } from "../../ui/inputs/button";
+import { Choice, Toggle } from "../../ui/inputs/choice";
+import { Panel } from "../../ui/panel/panel";
 import { change, changeFixture, chosen, FLOOR, mayEdit, published, remove, rename, shownContent } from "./cell-draft";
 import { dragging } from "./cell-preview";
 import { Fields, NumberField, Vector } from "./fields";

@@ -3,7 +3,7 @@
 import type { ComponentChildren } from "preact";
 import type { CellMember } from "../../gen/robomesh_pb";
 import { cellText as c } from "../../i18n/texts";
-import { Panel } from "../../ui/panel";
+import { Panel } from "../../ui/panel/panel";
 import { lengthText, vectorText } from "./cell-text";
 
 /** The robots, for reading: their settings need the site file and a restart. */

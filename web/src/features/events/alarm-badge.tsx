@@ -4,7 +4,7 @@ import { useEffect } from "preact/hooks";
 import { eventsText as e } from "../../i18n/texts";
 import { anyWatch, counts, followAlarms, silentSites } from "../../mesh/services/alarms";
 import { startSound } from "../../panels/alarm-sound";
-import { PriorityMark, priorityWord } from "../../ui/priority-mark";
+import { PriorityMark, priorityWord } from "../../ui/marks/priority-mark";
 import "./alarm-badge.css";
 
 /** Return "3 high". */

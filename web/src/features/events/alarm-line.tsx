@@ -7,9 +7,9 @@ import type { NameIn } from "../../i18n/texts";
 import { eventsText as e } from "../../i18n/texts";
 import type { Alarm } from "../../mesh/services/alarms";
 import { isUnacknowledged, nameOf, State } from "../../mesh/services/alarms";
-import { Button } from "../../ui/button";
-import { PriorityMark } from "../../ui/priority-mark";
-import { robotLink } from "../../ui/route";
+import { Button } from "../../ui/inputs/button";
+import { PriorityMark } from "../../ui/marks/priority-mark";
+import { robotLink } from "../../ui/page/route";
 
 const STATE_WORDS: Partial<Record<State, NameIn<"events">>> = {
   [State.STATE_UNSPECIFIED]: "state_unacknowledged",

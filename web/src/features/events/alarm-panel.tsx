@@ -24,13 +24,13 @@ import {
   sorted,
 } from "../../mesh/services/alarms";
 import { setSound, sound } from "../../panels/alarm-sound";
-import { Button } from "../../ui/button";
-import { Choice, Toggle } from "../../ui/choice";
-import { NoticeLine } from "../../ui/notice-line";
-import { useOutcome } from "../../ui/outcome";
-import { Select } from "../../ui/select";
-import { TextInput } from "../../ui/text-input";
-import { Warning } from "../../ui/warning";
+import { Button } from "../../ui/inputs/button";
+import { Choice, Toggle } from "../../ui/inputs/choice";
+import { Select } from "../../ui/inputs/select";
+import { TextInput } from "../../ui/inputs/text-input";
+import { Warning } from "../../ui/marks/warning";
+import { NoticeLine } from "../../ui/panel/notice-line";
+import { useOutcome } from "../../ui/panel/outcome";
 import { AlarmLine } from "./alarm-line";
 import { ShelveForm } from "./shelve-form";
 

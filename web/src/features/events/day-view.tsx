@@ -5,9 +5,9 @@ import { count, DASH, dateOf, timeOfDay, timeText, whenText, zoneOf } from "../.
 import type { NameIn } from "../../i18n/texts";
 import { dayText as d } from "../../i18n/texts";
 import { lostAt } from "../../mesh/console/connection";
-import { Button } from "../../ui/button";
-import { saveFile } from "../../ui/save-file";
-import { Warning } from "../../ui/warning";
+import { Button } from "../../ui/inputs/button";
+import { Warning } from "../../ui/marks/warning";
+import { saveFile } from "../../ui/page/save-file";
 import type { DayLine, Totals } from "./day";
 import { exported, lastedText, linesOf, spanOfDay, totalsOf, wordsOf } from "./day";
 import type { DayAnswers } from "./day-sources";

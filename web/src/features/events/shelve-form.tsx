@@ -4,8 +4,8 @@ import { useState } from "preact/hooks";
 import { alarmText } from "../../i18n/alarm-text";
 import { eventsText as e } from "../../i18n/texts";
 import type { Alarm } from "../../mesh/services/alarms";
-import { Choice } from "../../ui/choice";
-import { ReasonForm } from "../../ui/reason-form";
+import { Choice } from "../../ui/inputs/choice";
+import { ReasonForm } from "../../ui/inputs/reason-form";
 
 const TIMES = { minutes_15: 900, hour: 3600, hours_8: 28_800, day: 86_400 } as const;
 type Time = keyof typeof TIMES;

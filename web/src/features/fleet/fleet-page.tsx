@@ -14,11 +14,11 @@ import { isClockOff, isMeshStale, isSilent, reportAge, useMesh } from "../../mes
 import { ageOf } from "../../mesh/state/staleness";
 import { now } from "../../mesh/state/topics";
 import { AliveServices } from "../../panels/alive-services";
-import { Button } from "../../ui/button";
-import { Select } from "../../ui/select";
-import { State } from "../../ui/state";
-import { TextInput } from "../../ui/text-input";
-import { Warning } from "../../ui/warning";
+import { Button } from "../../ui/inputs/button";
+import { Select } from "../../ui/inputs/select";
+import { TextInput } from "../../ui/inputs/text-input";
+import { State } from "../../ui/marks/state";
+import { Warning } from "../../ui/marks/warning";
 import { RunningReplays } from "./replays";
 import { RobotTile } from "./tile";
 

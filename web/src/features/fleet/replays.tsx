@@ -7,9 +7,9 @@ import { momentText } from "../../i18n/recording-format";
 import { recordingsText as r } from "../../i18n/texts";
 import { ageOf, isStale } from "../../mesh/state/staleness";
 import { useTopics } from "../../mesh/state/topics";
-import { ReplayTag } from "../../ui/replay-tag";
-import { recordingsLink, robotLink } from "../../ui/route";
-import "../../ui/replay.css";
+import { ReplayTag } from "../../ui/marks/replay-tag";
+import { recordingsLink, robotLink } from "../../ui/page/route";
+import "../../ui/marks/replay.css";
 import "./replays.css";
 
 export function RunningReplays() {

@@ -7,7 +7,7 @@ import { floorOf } from "../../mesh/state/clearance";
 import { DrawLoop } from "../../scene/canvas/draw-loop";
 import { countFrame, drawsInSoftware, makeRenderer } from "../../scene/canvas/webgl";
 import { palette } from "../../scene/parts/surroundings";
-import { theme } from "../../ui/theme";
+import { theme } from "../../ui/page/theme";
 import { type TileArm, tileArmOf } from "./tile-arm";
 
 const FIELD_OF_VIEW = 28; // degrees, upright

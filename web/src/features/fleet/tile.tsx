@@ -14,12 +14,12 @@ import { problemOf, stateWord } from "../../mesh/state/robot-state";
 import { ageOf, isStale } from "../../mesh/state/staleness";
 import { now, useTopic } from "../../mesh/state/topics";
 import { AliveServices } from "../../panels/alive-services";
-import { PriorityMark } from "../../ui/priority-mark";
-import { RobotTags } from "../../ui/robot-tags";
-import { robotLink } from "../../ui/route";
-import { Silhouette } from "../../ui/silhouette";
-import { State } from "../../ui/state";
-import { Tag } from "../../ui/tag";
+import { PriorityMark } from "../../ui/marks/priority-mark";
+import { RobotTags } from "../../ui/marks/robot-tags";
+import { Silhouette } from "../../ui/marks/silhouette";
+import { State } from "../../ui/marks/state";
+import { Tag } from "../../ui/marks/tag";
+import { robotLink } from "../../ui/page/route";
 import { useVisible } from "./visibility";
 
 export function RobotTile({ robotKey }: { robotKey: string }) {

@@ -3,7 +3,7 @@
 import { Component } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { programText as p } from "../../i18n/texts";
-import { Panel } from "../../ui/panel";
+import { Panel } from "../../ui/panel/panel";
 import { draft, insert, LINE_PX, recordTyping, redo, setField, storageError, undo } from "./draft/draft";
 import { highlightSyntax } from "./draft/program-text";
 import { lineAtMoment } from "./motion/checked-motion";

@@ -3,9 +3,9 @@
 import type { Words } from "../../i18n/texts";
 import { programText as p, storedText as s } from "../../i18n/texts";
 import { mayAct } from "../../mesh/console/account";
-import { Button } from "../../ui/button";
-import { FileButton } from "../../ui/file-button";
-import { TextInput } from "../../ui/text-input";
+import { Button } from "../../ui/inputs/button";
+import { FileButton } from "../../ui/inputs/file-button";
+import { TextInput } from "../../ui/inputs/text-input";
 import {
   canRedo,
   canUndo,

@@ -1,7 +1,7 @@
 // Recordings: the list and the player.
 
-import "../../ui/replay.css";
-import type { RecordingName } from "../../ui/route";
+import "../../ui/marks/replay.css";
+import type { RecordingName } from "../../ui/page/route";
 import { RecordingList } from "./list/recording-list";
 import { Player } from "./player/player";
 

@@ -4,7 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n/texts";
 import { reasonOf } from "../../mesh/console/connection";
 import { readRefusal } from "../../mesh/console/refusal";
-import { saveFile } from "../../ui/save-file";
+import { saveFile } from "../../ui/page/save-file";
 
 // A browser keeps the recording in memory.
 const MOST_BYTES = 512 * 1024 * 1024;

@@ -3,11 +3,11 @@
 import { signal } from "@preact/signals";
 import { useMemo, useState } from "preact/hooks";
 import { plotsText as p } from "../../i18n/texts";
-import { Button } from "../../ui/button";
-import type { Layout, LayoutProblem } from "../../ui/layout";
-import { DEFAULT_LAYOUT, layoutText, PANELS, readLayout } from "../../ui/layout";
-import { layoutQuery, setLayoutQuery } from "../../ui/route";
-import { Warning } from "../../ui/warning";
+import { Button } from "../../ui/inputs/button";
+import { Warning } from "../../ui/marks/warning";
+import type { Layout, LayoutProblem } from "../../ui/page/layout";
+import { DEFAULT_LAYOUT, layoutText, PANELS, readLayout } from "../../ui/page/layout";
+import { layoutQuery, setLayoutQuery } from "../../ui/page/route";
 import { SavedLayouts } from "./saved-layouts";
 import "./layout-panel.css";
 

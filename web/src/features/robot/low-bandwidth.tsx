@@ -3,8 +3,8 @@
 import { t } from "../../i18n/texts";
 import { isClockOff, useMesh } from "../../mesh/state/site-health";
 import { isRemote, selectTopics, TOPIC_SELECTIONS, topicSelection } from "../../scene/topic-selection";
-import { Choice } from "../../ui/choice";
-import { Warning } from "../../ui/warning";
+import { Choice } from "../../ui/inputs/choice";
+import { Warning } from "../../ui/marks/warning";
 
 export function TopicChoice({ robotKey }: { robotKey: string }) {
   if (!isRemote(robotKey)) return null;

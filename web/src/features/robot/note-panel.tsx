@@ -5,7 +5,7 @@ import { useState } from "preact/hooks";
 import { notesText as n } from "../../i18n/texts";
 import type { NoteTime } from "../../mesh/services/notes";
 import { NoteForm } from "../../panels/note-form";
-import { Choice } from "../../ui/choice";
+import { Choice } from "../../ui/inputs/choice";
 import "./record-panel.css";
 
 const BEFORE_S = { now: 0, last_10: 10, last_60: 60 } as const;

@@ -9,13 +9,13 @@ import { mayAct } from "../../mesh/console/account";
 import { ask } from "../../mesh/console/connection";
 import { asker } from "../../mesh/services/alarms";
 import { useTopic } from "../../mesh/state/topics";
-import { Button } from "../../ui/button";
-import { NoticeLine } from "../../ui/notice-line";
-import { useOutcome } from "../../ui/outcome";
-import { setLayoutQuery } from "../../ui/route";
-import { Select } from "../../ui/select";
-import { submit } from "../../ui/submit";
-import { TextInput } from "../../ui/text-input";
+import { Button } from "../../ui/inputs/button";
+import { Select } from "../../ui/inputs/select";
+import { submit } from "../../ui/inputs/submit";
+import { TextInput } from "../../ui/inputs/text-input";
+import { setLayoutQuery } from "../../ui/page/route";
+import { NoticeLine } from "../../ui/panel/notice-line";
+import { useOutcome } from "../../ui/panel/outcome";
 
 const TIMEOUT_S = 10; // the answer waits for the disk
 const LONGEST_NAME = 60;

@@ -1,7 +1,7 @@
 // The product and its licence.
 
 import { settingsText as s } from "../../i18n/texts";
-import { Panel } from "../../ui/panel";
+import { Panel } from "../../ui/panel/panel";
 
 export function About() {
   return (

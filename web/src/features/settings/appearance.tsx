@@ -2,9 +2,9 @@
 
 import { LANGUAGES, language, languageName, settingsText as s, switchLanguage } from "../../i18n/texts";
 import { setSound, sound } from "../../panels/alarm-sound";
-import { Choice } from "../../ui/choice";
-import { Panel } from "../../ui/panel";
-import { switchTheme, theme } from "../../ui/theme";
+import { Choice } from "../../ui/inputs/choice";
+import { switchTheme, theme } from "../../ui/page/theme";
+import { Panel } from "../../ui/panel/panel";
 import { Facts } from "./facts";
 
 export function Appearance() {

@@ -4,8 +4,8 @@ import { settingsText as s } from "../../i18n/texts";
 import { presence } from "../../mesh/console/connection";
 import { OPERATOR } from "../../mesh/state/known-robots";
 import { robotSnapshot } from "../../mesh/state/robot-snapshots";
-import { Panel } from "../../ui/panel";
-import { robotLink } from "../../ui/route";
+import { robotLink } from "../../ui/page/route";
+import { Panel } from "../../ui/panel/panel";
 
 const WATCHERS = new Set(["monitor", "console", "foxglove", "ros2"]);
 

@@ -3,7 +3,7 @@
 import { ageText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
 import { useMesh } from "../../mesh/state/site-health";
-import { Panel } from "../../ui/panel";
+import { Panel } from "../../ui/panel/panel";
 import { Marked } from "./this-console";
 
 /** The name in a process's health message: see robomesh/wire/session.py. */

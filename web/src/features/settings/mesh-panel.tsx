@@ -8,7 +8,7 @@ import { isMeshStale, useMesh } from "../../mesh/state/site-health";
 import { ageOf } from "../../mesh/state/staleness";
 import type { Latest } from "../../mesh/state/topics";
 import { AliveServices } from "../../panels/alive-services";
-import { Panel } from "../../ui/panel";
+import { Panel } from "../../ui/panel/panel";
 import { DelayChart } from "./delay-chart";
 import { COLUMNS, ProcessRow } from "./process-row";
 

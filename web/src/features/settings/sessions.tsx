@@ -4,10 +4,10 @@ import { useEffect, useState } from "preact/hooks";
 import { timeText } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
 import { post } from "../../mesh/console/account";
-import { Button } from "../../ui/button";
-import { NoticeLine } from "../../ui/notice-line";
-import { useOutcome } from "../../ui/outcome";
-import { Panel } from "../../ui/panel";
+import { Button } from "../../ui/inputs/button";
+import { NoticeLine } from "../../ui/panel/notice-line";
+import { useOutcome } from "../../ui/panel/outcome";
+import { Panel } from "../../ui/panel/panel";
 
 const REFRESH_INTERVAL_MS = 5000;
 

@@ -4,7 +4,7 @@ import type { ToPage_Hello as Hello } from "../../gen/robomesh_pb";
 import { DASH } from "../../i18n/format";
 import { settingsText as s } from "../../i18n/texts";
 import { lostAt } from "../../mesh/console/connection";
-import { Panel } from "../../ui/panel";
+import { Panel } from "../../ui/panel/panel";
 import { Facts } from "./facts";
 
 const LOOPBACK = /^(localhost|127\.\d+\.\d+\.\d+|\[::1\])$/;

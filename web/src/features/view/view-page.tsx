@@ -12,9 +12,9 @@ import { isReplay } from "../../mesh/state/robot-name";
 import { stateWord } from "../../mesh/state/robot-state";
 import { ageOf, isStale } from "../../mesh/state/staleness";
 import { useTopic } from "../../mesh/state/topics";
-import type { ViewName } from "../../ui/route";
-import { Age, State } from "../../ui/state";
-import { Tag } from "../../ui/tag";
+import { Age, State } from "../../ui/marks/state";
+import { Tag } from "../../ui/marks/tag";
+import type { ViewName } from "../../ui/page/route";
 
 export function ViewPage({ site, robot, view }: ViewName) {
   const key = `robomesh/${site}/${robot}`;

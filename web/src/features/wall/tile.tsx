@@ -6,10 +6,10 @@ import { t, viewText, wallText as w } from "../../i18n/texts";
 import { isReplay } from "../../mesh/state/robot-name";
 import { problemOf, replayWord, stateText, stateWord } from "../../mesh/state/robot-state";
 import type { Latest } from "../../mesh/state/topics";
-import type { ViewName } from "../../ui/route";
-import { robotLink } from "../../ui/route";
-import { Age, State } from "../../ui/state";
-import { Tag } from "../../ui/tag";
+import { Age, State } from "../../ui/marks/state";
+import { Tag } from "../../ui/marks/tag";
+import type { ViewName } from "../../ui/page/route";
+import { robotLink } from "../../ui/page/route";
 import { useLiveVideo } from "../../video/live-video";
 import { requestFor } from "./grid";
 

@@ -1,9 +1,9 @@
 // Choice of the wall's pictures: a row a robot, a button a view.
 
 import { viewText, wallText as w } from "../../i18n/texts";
-import { Button } from "../../ui/button";
-import { Toggle } from "../../ui/choice";
-import type { ViewName } from "../../ui/route";
+import { Button } from "../../ui/inputs/button";
+import { Toggle } from "../../ui/inputs/choice";
+import type { ViewName } from "../../ui/page/route";
 
 export interface RobotViews {
   site: string;

@@ -6,9 +6,9 @@ import { ControllerStateSchema, DescriptionSchema, ReplayStateSchema } from "../
 import { t, wallText as w } from "../../i18n/texts";
 import { addKnownRobots, fleetRobots } from "../../mesh/state/known-robots";
 import { useTopics } from "../../mesh/state/topics";
-import { Button } from "../../ui/button";
-import type { ViewName } from "../../ui/route";
-import { robotLink, wallLink } from "../../ui/route";
+import { Button } from "../../ui/inputs/button";
+import type { ViewName } from "../../ui/page/route";
+import { robotLink, wallLink } from "../../ui/page/route";
 import { columnsFor } from "./grid";
 import { WallTile } from "./tile";
 import type { RobotViews } from "./view-choice";

@@ -21,9 +21,9 @@ import {
 } from "../../mesh/state/robot-state";
 import type { Latest } from "../../mesh/state/topics";
 import { now } from "../../mesh/state/topics";
-import { Button } from "../../ui/button";
-import { NoticeLine } from "../../ui/notice-line";
-import { Panel } from "../../ui/panel";
+import { Button } from "../../ui/inputs/button";
+import { NoticeLine } from "../../ui/panel/notice-line";
+import { Panel } from "../../ui/panel/panel";
 import { mayNotCommand } from "./no-control";
 import { RecoverButton, RecoverForm } from "./recover";
 import { Speed } from "./speed";

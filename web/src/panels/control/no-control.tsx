@@ -3,10 +3,10 @@
 import { useState } from "preact/hooks";
 import { accountText as a } from "../../i18n/texts";
 import { isMonitor, mayAct, me, unlock } from "../../mesh/console/account";
-import { Button } from "../../ui/button";
-import { useOutcome } from "../../ui/outcome";
-import { PasswordField } from "../../ui/password-field";
-import { submit } from "../../ui/submit";
+import { Button } from "../../ui/inputs/button";
+import { PasswordField } from "../../ui/inputs/password-field";
+import { submit } from "../../ui/inputs/submit";
+import { useOutcome } from "../../ui/panel/outcome";
 import "../account-form.css";
 
 /** Return whether the signed-in account may not request control now. */

@@ -7,7 +7,7 @@ import { t } from "../../i18n/texts";
 import { reachable } from "../../mesh/console/connection";
 import { Command, command } from "../../mesh/control/command";
 import { moves } from "../../mesh/state/robot-state";
-import { ReasonForm } from "../../ui/reason-form";
+import { ReasonForm } from "../../ui/inputs/reason-form";
 
 const NAMES = {
   [Recovery.UNLOCK_PROTECTIVE_STOP]: "recover_unlock",

@@ -10,7 +10,7 @@ import { reachable } from "../../mesh/console/connection";
 import type { CommandValues } from "../../mesh/control/command";
 import { Command } from "../../mesh/control/command";
 import { moves, stopText } from "../../mesh/state/robot-state";
-import { Button } from "../../ui/button";
+import { Button } from "../../ui/inputs/button";
 
 export function Stopped(props: {
   state: ControllerState;

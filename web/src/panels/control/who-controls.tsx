@@ -19,9 +19,9 @@ import {
   take,
   takeOver,
 } from "../../mesh/control/control";
-import { Button } from "../../ui/button";
-import { ReasonForm } from "../../ui/reason-form";
-import { TextInput } from "../../ui/text-input";
+import { Button } from "../../ui/inputs/button";
+import { ReasonForm } from "../../ui/inputs/reason-form";
+import { TextInput } from "../../ui/inputs/text-input";
 import { mayNotCommand, NoControl } from "./no-control";
 
 const MOST_ASKERS_SHOWN = 3;

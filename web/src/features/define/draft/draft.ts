@@ -1,7 +1,7 @@
 // The draft being defined, its undo and redo, and how it survives a reload.
 
 import { batch, computed, effect, signal } from "@preact/signals";
-import { undoHistory } from "../../../ui/undo-history";
+import { undoHistory } from "../../../ui/page/undo-history";
 import type { Description } from "../description/description";
 
 /** The editable state, which undo restores. */

@@ -3,10 +3,10 @@
 import type { ComponentChildren } from "preact";
 import { useId } from "preact/hooks";
 import { defineText as d } from "../../../i18n/texts";
-import { NumberInput } from "../../../ui/number-input";
-import { Select } from "../../../ui/select";
-import { TextInput } from "../../../ui/text-input";
-import { Warning } from "../../../ui/warning";
+import { NumberInput } from "../../../ui/inputs/number-input";
+import { Select } from "../../../ui/inputs/select";
+import { TextInput } from "../../../ui/inputs/text-input";
+import { Warning } from "../../../ui/marks/warning";
 import { angleUnit } from "../description/description";
 import { invalidNumbers, problemsAt, setInvalidNumber } from "./checks";
 import { draft, endUndoStep, setValue, valueAt } from "./draft";

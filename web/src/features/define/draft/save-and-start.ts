@@ -4,7 +4,7 @@ import { signal } from "@preact/signals";
 import { defineText as d } from "../../../i18n/texts";
 import { reasonOf } from "../../../mesh/console/connection";
 import { RefusedRequest } from "../../../mesh/console/refusal";
-import { saveFile } from "../../../ui/save-file";
+import { saveFile } from "../../../ui/page/save-file";
 import { checked, invalidNumbers } from "./checks";
 import { draft, identity, isOpen, isUnsaved, markSaved, parsePath } from "./draft";
 import { openField } from "./selection";

@@ -1,8 +1,8 @@
 // Missing files that other files refer to, until they are added or skipped.
 
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { FileButton } from "../../../ui/file-button";
+import { Button } from "../../../ui/inputs/button";
+import { FileButton } from "../../../ui/inputs/file-button";
 import { missingFiles } from "../draft/mesh-files";
 import { chosen, continueWithoutMissing, skippedFiles, takeFiles, waitingUrdf } from "./dropped-files";
 

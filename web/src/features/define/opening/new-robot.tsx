@@ -3,8 +3,8 @@
 import { useEffect } from "preact/hooks";
 import { whenText } from "../../../i18n/format";
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { FileButton } from "../../../ui/file-button";
+import { Button } from "../../../ui/inputs/button";
+import { FileButton } from "../../../ui/inputs/file-button";
 import { empty } from "../description/description";
 import { insertJoint } from "../description/edits";
 import { hasStoredDraft, newDrafts, openDraft, restoreDraft } from "../draft/draft";

@@ -3,8 +3,8 @@
 import { useEffect } from "preact/hooks";
 import type { NameIn } from "../../../i18n/texts";
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { Warning } from "../../../ui/warning";
+import { Button } from "../../../ui/inputs/button";
+import { Warning } from "../../../ui/marks/warning";
 import type { PairRow } from "../draft/collision-plan";
 import {
   isPlanned,

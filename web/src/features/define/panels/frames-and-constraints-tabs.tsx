@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
+import { Button } from "../../../ui/inputs/button";
 import type { Description } from "../description/description";
 import { jointUnit, linkNames } from "../description/description";
 import { unusedName } from "../description/edits";

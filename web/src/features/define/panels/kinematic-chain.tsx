@@ -3,8 +3,8 @@
 import { signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { Panel } from "../../../ui/panel";
+import { Button } from "../../../ui/inputs/button";
+import { Panel } from "../../../ui/panel/panel";
 import type { Description, Joint } from "../description/description";
 import { linkName } from "../description/description";
 import { insertJoint, makeBase, moveJoint, removeJoint } from "../description/edits";

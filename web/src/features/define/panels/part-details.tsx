@@ -2,9 +2,9 @@
 
 import { count } from "../../../i18n/format";
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { Choice } from "../../../ui/choice";
-import { FileButton } from "../../../ui/file-button";
+import { Button } from "../../../ui/inputs/button";
+import { Choice } from "../../../ui/inputs/choice";
+import { FileButton } from "../../../ui/inputs/file-button";
 import type { Body, Description, Joint } from "../description/description";
 import { jointUnit } from "../description/description";
 import { renameJoint, renameLink, setType } from "../description/edits";

@@ -3,10 +3,10 @@
 import { Matrix4 } from "three";
 import { fixed } from "../../../i18n/format";
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { numberText } from "../../../ui/number-text";
-import { Panel } from "../../../ui/panel";
-import { Unit } from "../../../ui/unit";
+import { Button } from "../../../ui/inputs/button";
+import { numberText } from "../../../ui/inputs/number-text";
+import { Unit } from "../../../ui/marks/unit";
+import { Panel } from "../../../ui/panel/panel";
 import type { Joint, Units } from "../description/description";
 import { jointUnit } from "../description/description";
 import { checkError, checked, checking } from "../draft/checks";

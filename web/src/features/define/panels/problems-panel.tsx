@@ -1,7 +1,7 @@
 // The draft's problems in the server's words; a click opens the field.
 
 import { defineText as d } from "../../../i18n/texts";
-import { Panel } from "../../../ui/panel";
+import { Panel } from "../../../ui/panel/panel";
 import { checkError, checked, checking, problems, readingShapes } from "../draft/checks";
 import { openField } from "../draft/selection";
 

@@ -3,9 +3,9 @@
 import { useState } from "preact/hooks";
 import { whenText } from "../../../i18n/format";
 import { defineText as d, t } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { outcomeRole } from "../../../ui/notice-line";
-import { robotLink } from "../../../ui/route";
+import { Button } from "../../../ui/inputs/button";
+import { robotLink } from "../../../ui/page/route";
+import { outcomeRole } from "../../../ui/panel/notice-line";
 import {
   canRedo,
   canUndo,

@@ -2,7 +2,7 @@
 
 import { useState } from "preact/hooks";
 import { defineText as d, viewText } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
+import { Button } from "../../../ui/inputs/button";
 import type { View } from "../description/description";
 import { draft, editDraft, setValue } from "../draft/draft";
 import { ProblemWords, SelectField, TextField } from "../draft/fields";

@@ -2,8 +2,8 @@
 
 import { useId } from "preact/hooks";
 import { defineText as d } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { Warning } from "../../../ui/warning";
+import { Button } from "../../../ui/inputs/button";
+import { Warning } from "../../../ui/marks/warning";
 import type { Joint } from "../description/description";
 import { jointUnit } from "../description/description";
 import { problemsAt } from "../draft/checks";

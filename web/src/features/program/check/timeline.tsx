@@ -2,8 +2,8 @@
 
 import { useEffect } from "preact/hooks";
 import { programText as p } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { Panel } from "../../../ui/panel";
+import { Button } from "../../../ui/inputs/button";
+import { Panel } from "../../../ui/panel/panel";
 import { clearanceAtMoment, duration, lineAtMoment, moment, path, playing } from "../motion/checked-motion";
 import { distanceText, seconds } from "../motion/number-format";
 import { checked } from "../motion/program-check";

@@ -4,8 +4,8 @@
 
 import { computed, effect, signal } from "@preact/signals";
 import { programText as p } from "../../../i18n/texts";
-import { saveFile } from "../../../ui/save-file";
-import { undoHistory } from "../../../ui/undo-history";
+import { saveFile } from "../../../ui/page/save-file";
+import { undoHistory } from "../../../ui/page/undo-history";
 
 export interface Draft {
   robotKey: string;

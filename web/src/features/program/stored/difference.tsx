@@ -3,7 +3,7 @@
 import { useMemo, useState } from "preact/hooks";
 import { count } from "../../../i18n/format";
 import { storedText as s } from "../../../i18n/texts";
-import { Choice } from "../../../ui/choice";
+import { Choice } from "../../../ui/inputs/choice";
 import type { Row } from "./diff";
 import { diffRows, sideBySide } from "./diff";
 

@@ -3,10 +3,10 @@
 import { useState } from "preact/hooks";
 import { programText as p, storedText as s, t } from "../../../i18n/texts";
 import { mayAct } from "../../../mesh/console/account";
-import { Button } from "../../../ui/button";
-import { Toggle } from "../../../ui/choice";
-import { FileButton } from "../../../ui/file-button";
-import { Panel } from "../../../ui/panel";
+import { Button } from "../../../ui/inputs/button";
+import { Toggle } from "../../../ui/inputs/choice";
+import { FileButton } from "../../../ui/inputs/file-button";
+import { Panel } from "../../../ui/panel/panel";
 import { draft, FILE_ENDING, isUnsaved } from "../draft/draft";
 import { readProgramFile } from "../draft/program-files";
 import { example } from "../draft/program-text";

@@ -3,7 +3,7 @@
 import { useState } from "preact/hooks";
 import type { Words } from "../../../i18n/texts";
 import { programText as p } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
+import { Button } from "../../../ui/inputs/button";
 import { draft, goToLine, replace } from "../draft/draft";
 import type { Point } from "../draft/program-text";
 import { isName, jointsOf, pointsOf, removeLine, renamePoint, usesOf } from "../draft/program-text";

@@ -3,8 +3,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { DASH, fixed } from "../../../i18n/format";
 import { programText as p } from "../../../i18n/texts";
-import { Choice } from "../../../ui/choice";
-import { TextInput } from "../../../ui/text-input";
+import { Choice } from "../../../ui/inputs/choice";
+import { TextInput } from "../../../ui/inputs/text-input";
 import { dropRequestedPose, poseNumbers, poseOf, taughtPose, teachPose } from "../motion/taught-pose";
 import { gizmoMode } from "./teach-gizmo";
 

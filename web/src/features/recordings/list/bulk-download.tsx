@@ -3,7 +3,7 @@
 import type { Signal } from "@preact/signals";
 import { sizeText } from "../../../i18n/recording-format";
 import { recordingsText as r } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
+import { Button } from "../../../ui/inputs/button";
 import type { Row } from "./recordings-of-sites";
 
 /** As the console allows. */

@@ -2,12 +2,12 @@
 
 import { useState } from "preact/hooks";
 import { recordingsText as r } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import { NoticeLine } from "../../../ui/notice-line";
-import { useOutcome } from "../../../ui/outcome";
-import { ReasonForm } from "../../../ui/reason-form";
-import { submit } from "../../../ui/submit";
-import { TextInput } from "../../../ui/text-input";
+import { Button } from "../../../ui/inputs/button";
+import { ReasonForm } from "../../../ui/inputs/reason-form";
+import { submit } from "../../../ui/inputs/submit";
+import { TextInput } from "../../../ui/inputs/text-input";
+import { NoticeLine } from "../../../ui/panel/notice-line";
+import { useOutcome } from "../../../ui/panel/outcome";
 import { deleteRecording, saveLabels } from "./recording-changes";
 import type { Row } from "./recordings-of-sites";
 

@@ -3,10 +3,10 @@
 import { eventText } from "../../../i18n/event-text";
 import { momentText } from "../../../i18n/recording-format";
 import { recordingsText as r } from "../../../i18n/texts";
-import { Button } from "../../../ui/button";
-import type { RecordingName } from "../../../ui/route";
-import { recordingsLink } from "../../../ui/route";
-import { Warning } from "../../../ui/warning";
+import { Button } from "../../../ui/inputs/button";
+import { Warning } from "../../../ui/marks/warning";
+import type { RecordingName } from "../../../ui/page/route";
+import { recordingsLink } from "../../../ui/page/route";
 import type { RecordedEvent } from "../recorded/recorder-requests";
 
 const SHOWN_TEXT = 60;

@@ -7,7 +7,7 @@ import { PlayRequestSchema, ReplayStateSchema } from "../../../gen/robomesh_pb";
 import { recordingsText as r } from "../../../i18n/texts";
 import { AskError, ask, hello, presence, reasonOf } from "../../../mesh/console/connection";
 import { Replay } from "../../../mesh/services/replay";
-import type { RecordingName } from "../../../ui/route";
+import type { RecordingName } from "../../../ui/page/route";
 
 const TIMEOUT_S = 15; // the player first reads a long file
 const PRESENCE_DELAY_MS = 1500; // presence arrives after the greeting

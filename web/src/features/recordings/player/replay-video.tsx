@@ -8,8 +8,8 @@ import type { Replay } from "../../../mesh/services/replay";
 import type { MomentState } from "../../../mesh/services/replay-moment";
 import { useMomentState } from "../../../mesh/services/replay-moment";
 import { viewsOf } from "../../../scene/scene-view";
-import { Panel } from "../../../ui/panel";
-import { Select } from "../../../ui/select";
+import { Select } from "../../../ui/inputs/select";
+import { Panel } from "../../../ui/panel/panel";
 import { useLiveVideo } from "../../../video/live-video";
 import { standardView } from "../../../video/requested-view";
 

@@ -8,9 +8,9 @@ import type { SeriesAnswer_Series as Series } from "../../../gen/robomesh_pb";
 import { DASH, fixed } from "../../../i18n/format";
 import { momentText } from "../../../i18n/recording-format";
 import { commonOf, labelOf, shownUnit } from "../../../i18n/units";
-import { CurveMark } from "../../../ui/curve-mark";
-import { curveColour, plotAppearance } from "../../../ui/plot-appearance";
-import { theme } from "../../../ui/theme";
+import { theme } from "../../../ui/page/theme";
+import { CurveMark } from "../../../ui/plots/curve-mark";
+import { curveColour, plotAppearance } from "../../../ui/plots/plot-appearance";
 import type { Window } from "./recorder-requests";
 
 const GAP = 3; // a gap is longer than 3 usual intervals, and

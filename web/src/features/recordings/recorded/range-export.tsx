@@ -8,11 +8,11 @@ import { fileUrl, momentText, viewName } from "../../../i18n/recording-format";
 import { recordingsText as r } from "../../../i18n/texts";
 import { RefusedRequest, readRefusal } from "../../../mesh/console/refusal";
 import type { Notice } from "../../../mesh/control/control";
-import { Button } from "../../../ui/button";
-import { NoticeLine } from "../../../ui/notice-line";
-import type { RecordingName } from "../../../ui/route";
-import { Select } from "../../../ui/select";
-import { TextInput } from "../../../ui/text-input";
+import { Button } from "../../../ui/inputs/button";
+import { Select } from "../../../ui/inputs/select";
+import { TextInput } from "../../../ui/inputs/text-input";
+import type { RecordingName } from "../../../ui/page/route";
+import { NoticeLine } from "../../../ui/panel/notice-line";
 
 /** A line of the console's answer. */
 interface Progress {

@@ -21,7 +21,7 @@ import { durationS, startMs, topicOf } from "../../../i18n/recording-format";
 import { recordingsText as r } from "../../../i18n/texts";
 import { AskError, ask, inOwnName, lostAt, reasonOf, watch } from "../../../mesh/console/connection";
 import { readNotes, timeOfNote, WRITTEN, withdrawnIds } from "../../../mesh/services/notes";
-import type { RecordingName } from "../../../ui/route";
+import type { RecordingName } from "../../../ui/page/route";
 
 const TIMEOUT_S = 20;
 const MAX_EVENTS = 1000;

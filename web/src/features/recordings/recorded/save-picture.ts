@@ -1,6 +1,6 @@
 // Export of the displayed plots as a picture.
 
-import { saveFile } from "../../../ui/save-file";
+import { saveFile } from "../../../ui/page/save-file";
 
 const EDGE_PX = 16;
 const LINE_PX = 24;

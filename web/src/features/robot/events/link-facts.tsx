@@ -9,7 +9,7 @@ import { Command } from "../../../mesh/control/command";
 import { ageOf, isStale } from "../../../mesh/state/staleness";
 import type { Latest } from "../../../mesh/state/topics";
 import { recoveryNames } from "../../../panels/control/recover";
-import { Unit } from "../../../ui/unit";
+import { Unit } from "../../../ui/marks/unit";
 
 const HASH_SHOWN = 4; // bytes of the log's last hash: enough to compare by eye
 

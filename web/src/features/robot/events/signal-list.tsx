@@ -7,8 +7,8 @@ import { groupOf, groupRank, groupTitle, signalText, signalValue } from "../../.
 import { signalsText as sg } from "../../../i18n/texts";
 import { ageOf, isStale } from "../../../mesh/state/staleness";
 import type { Latest } from "../../../mesh/state/topics";
-import { Age } from "../../../ui/state";
-import { Unit } from "../../../ui/unit";
+import { Age } from "../../../ui/marks/state";
+import { Unit } from "../../../ui/marks/unit";
 import "./signal-list.css";
 
 /** Groups with more signals are closed at first. */

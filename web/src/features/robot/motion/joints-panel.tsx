@@ -19,14 +19,14 @@ import { checkTarget, targetParts, targetProblem } from "../../../mesh/control/t
 import { isOnlyWatched, whyNoNewMotion, whyNoTarget, whyUnproven } from "../../../mesh/state/robot-state";
 import { now } from "../../../mesh/state/topics";
 import { ghostAt, redLinks } from "../../../scene/overlays";
-import { Choice } from "../../../ui/choice";
-import { JointTrack } from "../../../ui/joint-track";
-import { JointValue } from "../../../ui/joint-value";
-import { NoticeLine } from "../../../ui/notice-line";
-import { Panel } from "../../../ui/panel";
-import { Age } from "../../../ui/state";
-import { StepButton } from "../../../ui/step-button";
-import { Warning } from "../../../ui/warning";
+import { StepButton } from "../../../ui/hold/step-button";
+import { Choice } from "../../../ui/inputs/choice";
+import { JointTrack } from "../../../ui/joints/joint-track";
+import { JointValue } from "../../../ui/joints/joint-value";
+import { Age } from "../../../ui/marks/state";
+import { Warning } from "../../../ui/marks/warning";
+import { NoticeLine } from "../../../ui/panel/notice-line";
+import { Panel } from "../../../ui/panel/panel";
 
 const REACHED = 0.002; // rad or m: half of what the page displays
 const ABANDONED_MS = 1500;

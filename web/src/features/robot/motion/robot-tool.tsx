@@ -23,11 +23,11 @@ import type { Latest } from "../../../mesh/state/topics";
 import { now } from "../../../mesh/state/topics";
 import type { Axis } from "../../../panels/tool-panel";
 import { POSE_AXES, ToolPanel } from "../../../panels/tool-panel";
-import { Choice } from "../../../ui/choice";
-import { HoldButton } from "../../../ui/hold-button";
-import type { HoldEnd } from "../../../ui/hold-pointer";
-import { NoticeLine } from "../../../ui/notice-line";
-import { StepButton } from "../../../ui/step-button";
+import { HoldButton } from "../../../ui/hold/hold-button";
+import type { HoldEnd } from "../../../ui/hold/hold-pointer";
+import { StepButton } from "../../../ui/hold/step-button";
+import { Choice } from "../../../ui/inputs/choice";
+import { NoticeLine } from "../../../ui/panel/notice-line";
 import type { ToolStep } from "./tool-step";
 import { endText, FRAMES, isTurn } from "./tool-step";
 

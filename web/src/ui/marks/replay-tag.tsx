@@ -1,7 +1,7 @@
 // The mark of everything that is played back, in magenta and in words.
 
-import { timeText } from "../i18n/format";
-import { recordingsText as r } from "../i18n/texts";
+import { timeText } from "../../i18n/format";
+import { recordingsText as r } from "../../i18n/texts";
 import { Tag } from "./tag";
 
 /** The recorded robot, and the time of the recording. */

@@ -4,9 +4,9 @@
 // and a tap on the track does nothing. Keys: arrows set, Enter sends, Escape resets.
 
 import { useRef, useState } from "preact/hooks";
-import { t } from "../i18n/texts";
-import { followPress } from "./hold";
-import type { HoldEnd } from "./hold-pointer";
+import { t } from "../../i18n/texts";
+import { followPress } from "../hold/hold";
+import type { HoldEnd } from "../hold/hold-pointer";
 
 export interface TrackProps {
   label: string;

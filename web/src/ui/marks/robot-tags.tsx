@@ -1,8 +1,8 @@
 // Marks of a robot that is only watched, or has too few positions a second to follow its arm.
 
-import type { ControllerState } from "../gen/robomesh_pb";
-import { fixed } from "../i18n/format";
-import { t } from "../i18n/texts";
+import type { ControllerState } from "../../gen/robomesh_pb";
+import { fixed } from "../../i18n/format";
+import { t } from "../../i18n/texts";
 import { Tag } from "./tag";
 
 /** Nothing for a robot that can be moved and followed. */

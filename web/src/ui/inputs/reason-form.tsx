@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
-import { t } from "../i18n/texts";
+import { t } from "../../i18n/texts";
 import { Button } from "./button";
 import { submit } from "./submit";
 import { TextInput } from "./text-input";

@@ -1,8 +1,8 @@
 // An alarm's priority: a shape, a colour and a word, never the colour alone.
 
-import { Alarm_Priority as Priority } from "../gen/robomesh_pb";
-import type { NameIn } from "../i18n/texts";
-import { eventsText as e } from "../i18n/texts";
+import { Alarm_Priority as Priority } from "../../gen/robomesh_pb";
+import type { NameIn } from "../../i18n/texts";
+import { eventsText as e } from "../../i18n/texts";
 import "./priority-mark.css";
 
 const WORDS: Partial<Record<Priority, [NameIn<"events">, string]>> = {

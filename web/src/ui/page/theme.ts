@@ -1,7 +1,7 @@
 // The theme: dark unless the person or the system chooses light.
 
 import { signal } from "@preact/signals";
-import { readStored } from "../i18n/stored";
+import { readStored } from "../../i18n/stored";
 
 export type Theme = "dark" | "light";
 const STORAGE_KEY = "robomesh.theme";

@@ -1,11 +1,11 @@
 // A joint's value; a press turns it into a field for an exact target: Enter sends, Escape cancels.
 
 import { useState } from "preact/hooks";
-import type { Description_Joint } from "../gen/robomesh_pb";
-import { DASH, fixed, jointTitle, jointUnit } from "../i18n/format";
-import { t } from "../i18n/texts";
-import { TextInput } from "./text-input";
-import { Unit } from "./unit";
+import type { Description_Joint } from "../../gen/robomesh_pb";
+import { DASH, fixed, jointTitle, jointUnit } from "../../i18n/format";
+import { t } from "../../i18n/texts";
+import { TextInput } from "../inputs/text-input";
+import { Unit } from "../marks/unit";
 
 export function JointValue(props: {
   joint: Description_Joint;

@@ -1,8 +1,8 @@
 // Mark of an event's severity or an audit entry's outcome: a word, with a shape if it needs attention.
 
-import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../gen/robomesh_pb";
-import type { TextName } from "../i18n/texts";
-import { t } from "../i18n/texts";
+import { AuditEntry_Outcome as Outcome, Event_Severity as Severity } from "../../gen/robomesh_pb";
+import type { TextName } from "../../i18n/texts";
+import { t } from "../../i18n/texts";
 
 type Words<Value extends number> = Partial<Record<Value, [TextName, string]>>;
 

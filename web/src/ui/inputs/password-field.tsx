@@ -1,7 +1,7 @@
 // A password field that can show its text and warns of Caps Lock.
 
 import { useId, useState } from "preact/hooks";
-import { accountText as a } from "../i18n/texts";
+import { accountText as a } from "../../i18n/texts";
 import { Button } from "./button";
 import "./password-field.css";
 

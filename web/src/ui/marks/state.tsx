@@ -1,9 +1,9 @@
 // A state as a word with a shape and a colour, and the age of stale values.
 
-import { staleText } from "../i18n/format";
-import { t } from "../i18n/texts";
-import type { StateWord } from "../mesh/state/robot-state";
-import { stateText } from "../mesh/state/robot-state";
+import { staleText } from "../../i18n/format";
+import { t } from "../../i18n/texts";
+import type { StateWord } from "../../mesh/state/robot-state";
+import { stateText } from "../../mesh/state/robot-state";
 
 /** A state with the shape and colour of its level; of several, their number. */
 export function State({ state, count, told }: { state: StateWord; count?: number; told?: boolean }) {

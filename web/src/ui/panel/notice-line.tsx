@@ -1,8 +1,8 @@
 // The outcome of an action, in one line.
 
-import { t } from "../i18n/texts";
-import type { Notice } from "../mesh/control/control";
-import { Warning } from "./warning";
+import { t } from "../../i18n/texts";
+import type { Notice } from "../../mesh/control/control";
+import { Warning } from "../marks/warning";
 
 /** Return the role and the name of an outcome: a refusal interrupts a screen reader, all else waits. */
 export const outcomeRole = (refused: boolean) =>

@@ -1,8 +1,8 @@
 // The outcome of what a panel's buttons request.
 
 import { useState } from "preact/hooks";
-import { reasonOf } from "../mesh/console/connection";
-import type { Notice } from "../mesh/control/control";
+import { reasonOf } from "../../mesh/console/connection";
+import type { Notice } from "../../mesh/control/control";
 
 /** Return the outcome of the newest action, and a function that performs one.
  *

@@ -1,8 +1,8 @@
 // Route of the page, read from the address's hash, and links to each page.
 
 import { batch, signal } from "@preact/signals";
-import type { RobotName } from "../mesh/state/robot-name";
-import { canBe, isReplay } from "../mesh/state/robot-name";
+import type { RobotName } from "../../mesh/state/robot-name";
+import { canBe, isReplay } from "../../mesh/state/robot-name";
 
 /** The name of a recording's file and the site that has it. */
 export interface RecordingName {

@@ -1,6 +1,6 @@
 // The one press that is held on this page: events of the browser as inputs of the table in hold-pointer.ts.
 
-import { dialogIsOpen } from "../mesh/control/display-freshness";
+import { dialogIsOpen } from "../../mesh/control/display-freshness";
 import type { HoldEnd, HoldInput, HoldState } from "./hold-pointer";
 import { buttonsInput, moveInput, nextState, REST_MS } from "./hold-pointer";
 
