@@ -47,7 +47,7 @@ export function ToolPanel(props: {
         </>
       }
     >
-      <dl class={`numbers grid pad-0-16-12 ${steps ? "stepped" : ""} ${stale && state ? "stale" : ""}`}>
+      <dl class={`numbers grid pad-0-16-12 ${steps ? "stepped" : ""} ${stale && state ? "outdated" : ""}`}>
         {POSE_AXES.map((axis, i) => (
           <NumberRow
             key={axis}

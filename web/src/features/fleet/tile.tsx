@@ -99,7 +99,7 @@ function Shown({ robotKey, site, robot }: { robotKey: string; site: string; robo
         {/* One line for each case, so that a tile's height never changes. */}
         <div class="tile-line">
           {problem ? (
-            <p class={`tile-problem narrow clip small ${state.level}`} title={problem}>
+            <p class={`tile-problem toned narrow clip small ${state.level}`} title={problem}>
               {problem}
             </p>
           ) : (

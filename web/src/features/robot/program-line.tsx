@@ -33,9 +33,9 @@ export function ProgramLine({ latest }: { latest: Latest<ProgramState> }) {
   const stale = outcome === Outcome.RUNNING && isStale("program", age);
   const words = programText(latest);
   return (
-    <p class={`program-line row to-end gap-4 ${stale ? "stale" : ""} ${outcome === Outcome.ENDED ? "ended" : ""}`}>
+    <p class={`program-line row to-end gap-4 ${outcome === Outcome.ENDED ? "ended" : ""}`}>
       {(stale || outcome === Outcome.ENDED) && <span class="shape warning" aria-hidden="true" />}
-      <span class="program-words clip" title={words}>
+      <span class={`program-words clip ${stale ? "outdated" : ""}`} title={words}>
         {words}
       </span>
       {stale && <span class="age">{staleText(age)}</span>}

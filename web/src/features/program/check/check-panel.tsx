@@ -45,7 +45,7 @@ function Verdict({ moved }: { moved: boolean }) {
   if (checkError.value && !checking.value) {
     return (
       <Warning
-        class="verdict row wrap rigid tall-32 gap-0-8 pad-0-16-8 warning"
+        class="verdict row wrap rigid tall-32 gap-0-8 pad-0-16-8 warned"
         role="alert"
         text={<span>{p("check_failed", { text: checkError.value })}</span>}
       />
@@ -126,7 +126,7 @@ function Row({ group: { worst, first, last, fromS, untilS } }: { group: Violatio
   };
   return (
     <button class="violation pick grid small tall-44 gap-0-8 pad-4-8" aria-current={current} onClick={show}>
-      <span class={`violation-kind row bold ${level}`}>
+      <span class={`toned row bold ${level}`}>
         <span class={`shape ${level}`} aria-hidden="true" />
         {known ? p(known) : kind}
       </span>

@@ -121,7 +121,7 @@ export function Chart(props: {
           />
         ))}
       </figcaption>
-      <div class="chart-plot" ref={place} />
+      <div class="chart-plot ranged" ref={place} />
     </figure>
   );
 }

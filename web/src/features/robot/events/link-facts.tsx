@@ -87,7 +87,7 @@ export function LinkFacts({ controller }: { controller: Latest<ControllerState> 
   const capabilities = capabilitiesText(state);
   return (
     <dl
-      class={`facts-list grid grow short scroll small pad-0-16-8 ${stale ? "stale" : ""}`}
+      class={`facts-list grid grow short scroll small pad-0-16-8 ${stale ? "outdated" : ""}`}
       tabIndex={0}
       aria-label={t("link")}
     >

@@ -180,7 +180,7 @@ export function LiveChart(props: {
   const past = feed.past.value;
   useEffect(() => redraw.current(), [props.frozen, props.zoomed, past]);
   return (
-    <div class="plot" ref={place} role="img" aria-label={`${props.label}. ${p("zoom_hint")}`}>
+    <div class="plot ranged" ref={place} role="img" aria-label={`${props.label}. ${p("zoom_hint")}`}>
       {!any && <p class="plot-word grid center dim">{p("waiting")}</p>}
     </div>
   );
