@@ -347,7 +347,7 @@ def measure(
     # Both, because a shell lets background programs ignore Ctrl-C, and the programs started here would too.
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.default_int_handler)
-    result = {
+    result: dict[str, Any] = {
         "growth": growth,
         "rows": names,
         "peers": bool(peers_python),

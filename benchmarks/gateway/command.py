@@ -173,7 +173,7 @@ async def race_for_control(endpoint: str, rounds: int) -> dict[str, Any]:
                 answer = await sessions[name].ask(
                     f"{KEY}/lease/request/{name}", _LEASE(action=_LEASE.ACQUIRE, ttl_s=5.0), timeout_s=10.0
                 )
-                return answer.lease  # type: ignore[attr-defined, no-any-return]
+                return answer.lease  # type: ignore[attr-defined]
             except RefusedError:
                 return ""
 

@@ -95,7 +95,7 @@ async def listen(
 
 async def take_joints(joints: Subscription, states: dict[int, int], sources: dict[int, int]) -> None:
     async for sample in joints:
-        message = sample.message()
+        message: Any = sample.message()
         at = time.monotonic_ns()
         if k := number_in(message.joints):
             states[k] = at

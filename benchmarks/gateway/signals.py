@@ -74,13 +74,13 @@ def cost_of(rate_hz: int, seconds: float, *, signals: bool) -> dict[str, Any]:
         controller.tick(now_s)
         packages.append(rtde.package(rtde.PackageType.DATA, recipe.write(controller.values(names, now_s))))
     sink, other = Sink(), Sink()
-    journal = Journal(other, "arm")  # type: ignore[arg-type]
+    journal = Journal(other, "arm")
     telemetry = Telemetry(
         joints,
-        fast=other,  # type: ignore[arg-type]
-        slow=other,  # type: ignore[arg-type]
-        raw=other,  # type: ignore[arg-type]
-        signals=Signals(sink, journal, joints.names),  # type: ignore[arg-type]
+        fast=other,
+        slow=other,
+        raw=other,
+        signals=Signals(sink, journal, joints.names),
         journal=journal,
         stale_after_s=1.0,
         on_status=lambda: None,

@@ -41,7 +41,7 @@ def piped(target: Callable[..., Any], *arguments: Any) -> Iterator[Connection]:
 
 
 @contextlib.contextmanager
-def program(*words: str, **options: Any) -> Iterator[subprocess.Popen[bytes]]:
+def program(*words: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
     """Run a program without its output while the block runs."""
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     running = subprocess.Popen(words, **(quiet | options))

@@ -118,8 +118,8 @@ class WebSocketReader(asyncio.Protocol):
         return self
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        self.transport = transport  # type: ignore[assignment]
-        self.transport.write(f"{self._hello}\r\n".encode())  # type: ignore[union-attr]
+        self.transport = transport
+        self.transport.write(f"{self._hello}\r\n".encode())
 
     def send(self, payload: bytes, opcode: int = 2) -> None:
         """Send one message with a mask of zero bytes, which the protocol permits."""

@@ -176,7 +176,7 @@ async def press_on_request(address: str, cookie: str, pipe: Any) -> None:
     def open_socket(path: str) -> connect:
         return connect(
             f"ws://{address}/{path}",
-            origin=f"http://{address}",  # type: ignore[arg-type]
+            origin=f"http://{address}",
             additional_headers={"Cookie": cookie},
             compression=None,
             ping_interval=None,

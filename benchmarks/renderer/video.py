@@ -182,7 +182,7 @@ class Viewer:
     """A page's WebSocket that watches the view."""
 
     def __init__(self, address: str) -> None:
-        self._connecting = connect(f"ws://{address}/mesh", origin=f"http://{address}", compression=None)  # type: ignore[arg-type]
+        self._connecting = connect(f"ws://{address}/mesh", origin=f"http://{address}", compression=None)
 
     async def __aenter__(self) -> Any:
         socket_ = await self._connecting.__aenter__()
@@ -190,7 +190,7 @@ class Viewer:
         return socket_
 
     async def __aexit__(self, *error: object) -> None:
-        await self._connecting.__aexit__(*error)  # type: ignore[arg-type]
+        await self._connecting.__aexit__(*error)
 
 
 def watching(address: str, count: int, seconds: float, ages: Any) -> None:

@@ -240,7 +240,7 @@ async def watch_joints(session: Session, seen: Seen) -> None:
 
 async def watch_stops(session: Session, stops: set[str]) -> None:
     async for sample in session.subscribe(f"robomesh/{SITE}/*/controller", newest=1000):
-        if sample.message().HasField("stop"):  # type: ignore[arg-type]
+        if sample.message().HasField("stop"):
             stops.add(sample.key)
 
 
