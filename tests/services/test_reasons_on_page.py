@@ -89,7 +89,7 @@ def test_seconds_are_counted_down(module):
     ]
 
 
-def test_a_stop_without_a_name_has_it_within_and_at_the_begin_of_a_sentence(module):
+def test_an_unnamed_sender_has_a_capital_letter_only_at_the_start_of_a_sentence(module):
     script = """
     const since = { seconds: 0n, nanos: 0 };
     const latched = { code: "stop.latched", severity: 0, values: { by: "", sent: "True" }, timestamp: since };
