@@ -1,8 +1,6 @@
-"""Numbers that the page plots: named and read as the recorder does, and kept with every peak and gap."""
+"""Numbers that the page plots: named and read as the recorder does."""
 
 import base64
-import random
-from math import floor
 
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -17,7 +15,7 @@ from web import build_page
 pytestmark = pytest.mark.slow
 
 READ = """
-const { values, connection, gen, pb, buckets, layout } = await import(process.argv[1]);
+const { values, connection, gen, pb, layout } = await import(process.argv[1]);
 const chunks = [];
 for await (const chunk of process.stdin) chunks.push(chunk);
 const asked = JSON.parse(Buffer.concat(chunks).toString());
@@ -34,16 +32,6 @@ done(asked.messages.map(([topic, payload]) => {
   return found;
 }));
 """
-COLUMNS = """
-const kept = asked.series.map((samples) => {
-  const made = new buckets.Buckets(asked.span);
-  for (const [at, value] of samples) made.take(at, value);
-  return { buckets: made, holds: asked.holds, factor: 1 };
-});
-const { from, to, most } = asked;
-const columns = buckets.columnsOf(kept, from, to, most, [[]]);
-done(columns.map((column) => [...column].map((cell) => (cell === undefined ? "none" : cell))));
-"""
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +42,6 @@ def module(tmp_path_factory):
         connection="mesh/console/connection.ts",
         gen="gen/robomesh_pb.ts",
         layout="ui/page/layout.ts",
-        buckets="features/robot/plots/plot-buckets.ts",
         pb=build_page.MODULES / "@bufbuild/protobuf/dist/esm/index.js",
     )
 
@@ -139,39 +126,6 @@ def test_the_page_reads_the_same_numbers_as_the_recorder_with_the_same_names_and
 def test_every_topic_of_a_robot_that_has_numbers_can_be_plotted():
     assert set(live_topics()) >= {"joints", "kinematics", "controller", "lease", "program", "signals"}
     assert not {"frames", "joints/slow", "raw", "events", "description", "mesh"} & set(live_topics())
-
-
-@pytest.mark.parametrize("most", [400, 7000])
-def test_columns_keep_every_peak_and_break_the_line_at_a_gap(module, most):
-    random.seed(7)
-    times = [100.004 + i / 100 for i in range(6000) if not 2000 <= i < 2300]
-    samples = [(at, random.gauss(0, 1)) for at in times]
-    samples[1234] = (samples[1234][0], 99.0)
-    asked = {"series": [samples], "span": 60, "holds": 1.0, "from": 100.0, "to": 160.0, "most": most}
-    middles, low, high = page_modules.run(module, READ + COLUMNS, asked)
-    width = middles[1] - middles[0]
-    assert len(middles) <= min(most, 6000) + 2
-    expected = {}
-    for at, value in samples:
-        column = floor((at - middles[0] + width / 2) / width)
-        expected.setdefault(column, []).append(value)
-    assert max(each for each in high if isinstance(each, float | int)) == 99.0
-    assert sum(each is None for each in low) == 1
-    gap = middles[low.index(None)]
-    assert 120.0 - width <= gap <= 123.0
-    ranges = {i: (a, b) for i, (a, b) in enumerate(zip(low, high, strict=True)) if isinstance(a, float | int)}
-    assert ranges == {column: (min(values), max(values)) for column, values in expected.items()}
-
-
-def test_what_is_older_than_the_span_is_forgotten_and_a_repeated_sample_changes_nothing(module):
-    once = [(1000.004 + i / 100, float(i)) for i in range(20_000)]
-    twice = [*once, *once[-500:], (1000.0, 1e9)]
-    asked = {"series": [once, twice], "span": 60, "holds": 1.0, "from": 1130.0, "to": 1200.0, "most": 50_000}
-    middles, low, high, low_again, high_again = page_modules.run(module, READ + COLUMNS, asked)
-    assert (low, high) == (low_again, high_again)
-    kept = [at for at, value in zip(middles, low, strict=True) if isinstance(value, float | int)]
-    assert kept[0] == pytest.approx(1140.0, abs=0.03)
-    assert kept[-1] == pytest.approx(1199.99, abs=0.03)
 
 
 LAYOUTS = """

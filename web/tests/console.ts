@@ -113,6 +113,14 @@ export function publish<S extends DescMessage>(
 }
 let published = 0n;
 
+/** Let time pass [s] in which the console sends a message now and then, as it does. */
+export async function stayConnected(seconds: number): Promise<void> {
+  for (let left = 1000 * seconds; left > 0; left -= 200) {
+    await vi.advanceTimersByTimeAsync(Math.min(200, left));
+    say({ case: "answer", value: { id: 0n } } as ToPage);
+  }
+}
+
 /** Take the page's oldest request without an answer; wait for it. */
 export async function next(): Promise<Request> {
   for (let left = 1000; left && !requests.length; left--) await vi.advanceTimersByTimeAsync(5);

@@ -184,7 +184,11 @@ export class PlotFeed {
 
   /** Return how long a value is valid [s]: later, a plot has a gap. */
   holdOf(name: string): number {
-    const after = staleAfter(topicOf(name, topicsOfValues()) ?? "", this.description);
+    return this.holdOfTopic(topicOf(name, topicsOfValues()) ?? "");
+  }
+
+  private holdOfTopic(topic: string): number {
+    const after = staleAfter(topic, this.description);
     return Number.isFinite(after) ? after : 3600;
   }
 
@@ -221,7 +225,7 @@ export class PlotFeed {
       // By source time: delayed samples are drawn at the time of their measurement.
       const at = (sample.sourceTime + topic.ahead) / 1000;
       topic.liveFrom = Math.min(topic.liveFrom, at);
-      if (at - topic.last > this.holdOf(name)) this.onGap(topic, at - topic.last);
+      if (at - topic.last > this.holdOfTopic(name)) this.onGap(topic, at - topic.last);
       topic.last = at;
       read(sample.payload, (own, number) => {
         const value = topic.values.get(own);
