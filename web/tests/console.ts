@@ -59,7 +59,21 @@ export function newPage(): void {
   sessionStorage.clear();
   sockets.length = requests.length = 0;
   watched.clear();
+  forgetListeners();
 }
+
+/** Remove the listeners of earlier pages from window and document, and remember those of the next. */
+function forgetListeners(): void {
+  for (const remove of listeners.splice(0)) remove();
+  for (const target of [window, document] as EventTarget[]) {
+    const add = target.addEventListener.bind(target);
+    vi.spyOn(target, "addEventListener").mockImplementation((...given) => {
+      add(...given);
+      listeners.push(() => target.removeEventListener(...given));
+    });
+  }
+}
+const listeners: (() => void)[] = [];
 
 /** Open the page's connections and greet it. */
 export async function connect(hello: MessageInitShape<typeof ToPageSchema> | object = {}): Promise<void> {
