@@ -5,6 +5,7 @@ export default defineConfig({
     dir: "tests",
     environment: "happy-dom",
     reporters: ["dot"],
+    testTimeout: 60_000,
     unstubGlobals: true,
     restoreMocks: true,
     coverage: {

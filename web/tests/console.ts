@@ -54,6 +54,9 @@ export const watched = new Set<string>();
 export function newPage(): void {
   vi.resetModules();
   vi.useFakeTimers();
+  const now = performance.now.bind(performance);
+  stalledMs = 0;
+  vi.spyOn(performance, "now").mockImplementation(() => now() + stalledMs);
   vi.stubGlobal("WebSocket", Socket);
   localStorage.clear();
   sessionStorage.clear();
@@ -61,6 +64,13 @@ export function newPage(): void {
   watched.clear();
   forgetListeners();
 }
+
+/** Let time go on while the page's own thread stands still [ms]. */
+export function stall(ms: number): void {
+  stalledMs += ms;
+  vi.setSystemTime(Date.now() + ms);
+}
+let stalledMs = 0;
 
 /** Remove the listeners of earlier pages from window and document, and remember those of the next. */
 function forgetListeners(): void {

@@ -59,6 +59,7 @@ test("robots are known by a service or by what they publish, never by a person, 
 test("of many states of a robot the fleet draws the newest, a few times a second, and only its own tile", async () => {
   const { robotSnapshot, useFleetSnapshots } = await import("../../../src/mesh/state/robot-snapshots");
   const { fleetRobots } = await import("../../../src/mesh/state/known-robots");
+  const timers = vi.getTimerCount();
   const used = use(useFleetSnapshots);
   const drawn: number[] = [];
   const others: number[] = [];
@@ -67,12 +68,14 @@ test("of many states of a robot the fleet draws the newest, a few times a second
   for (const rateHz of [1, 2, 3]) publish(`${ARM}/controller`, ControllerStateSchema, { rateHz });
   publish(`${ARM}/lease`, LeaseSchema, { holder: "li" });
   await soon();
+  await soon();
   expect(drawn).toEqual([0, 3]);
   expect(others).toEqual([0]);
   expect(robotSnapshot(ARM).lease.value?.message.holder).toBe("li");
   expect(fleetRobots.value).toEqual([ARM]);
   used.end();
   expect([...watched].filter((key) => key.includes("*"))).toEqual([]);
+  expect(vi.getTimerCount()).toBe(timers);
 });
 
 test("each site's view of its mesh is known by the site", async () => {
