@@ -58,6 +58,15 @@ test.each([
     ],
     [0, 0, 0, 2],
   ],
+  [
+    "may be long, when others came in time",
+    [
+      [0, 0],
+      [0.1, 0.1],
+      [0.2, 20.2],
+    ],
+    [0, 0, 20],
+  ],
 ] as const)("the delay %s, whatever the clocks", (_, rows, expected) => {
   for (const offset of [0, 86_400, -3600.5]) {
     const found = delays(

@@ -149,7 +149,11 @@ test("a name is kept for the next page without its blanks, but not an account's"
   page.setOperator(" li ");
   expect([page.ownName(), localStorage.getItem("robomesh.operator")]).toEqual(["li", "li"]);
   connection.hello.value = { ...connection.hello.value, operator: "li.hall" } as never;
-  expect([page.operator.value, page.ownName(), localStorage.getItem("robomesh.operator")]).toEqual(["li.hall", "li.hall", "li"]);
+  expect([page.operator.value, page.ownName(), localStorage.getItem("robomesh.operator")]).toEqual([
+    "li.hall",
+    "li.hall",
+    "li",
+  ]);
 });
 
 test("control is taken over with a reason, or accepted", async () => {
@@ -173,7 +177,12 @@ test("control of another robot is given back before the new one is asked for", a
 });
 
 test.each([
-  ["a question", () => page.requestControl(ROBOT, "wang", "mine now"), { action: Action.ASK, reason: "mine now" }, "wang is told that you ask for control."],
+  [
+    "a question",
+    () => page.requestControl(ROBOT, "wang", "mine now"),
+    { action: Action.ASK, reason: "mine now" },
+    "wang is told that you ask for control.",
+  ],
   ["an offer", () => page.offer("wang"), { action: Action.OFFER, to: "wang", lease: "l" }, "Control offered to wang."],
   ["its withdrawal", () => page.offer(null), { action: Action.OFFER, to: "li", lease: "l" }, "Offer withdrawn."],
 ])("%s says what became of it", async (_, say, request, text) => {
@@ -212,7 +221,11 @@ test("control that the gateway no longer knows is lost with that reason", async 
 
 test.each([
   ["too slow", { code: "lease.gone", text: "not renewed" }, /too slow/],
-  ["not the cause, if another operator took control", { code: "lease.ended.taken", text: "taken by wang" }, /taken by wang/],
+  [
+    "not the cause, if another operator took control",
+    { code: "lease.ended.taken", text: "taken by wang" },
+    /taken by wang/,
+  ],
 ])("a page that stood still when its lease ended was %s", async (_, endedReason, why) => {
   await hold();
   await vi.advanceTimersByTimeAsync(200);

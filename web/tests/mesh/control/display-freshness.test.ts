@@ -20,7 +20,13 @@ const picture = (ageS: number | null, sequence = 7n): Picture => ({
 
 /** Show a view of the robot whose newest picture has an age [s]. */
 function showView(drawn: Picture | undefined, view = "front", element: Element | null = place()) {
-  const used = use(page.useShownView, ROBOT, view, view === page.OWN_DRAWING ? "joints" : `video/${view}`, () => element);
+  const used = use(
+    page.useShownView,
+    ROBOT,
+    view,
+    view === page.OWN_DRAWING ? "joints" : `video/${view}`,
+    () => element,
+  );
   used.result.picture = drawn;
   return used;
 }
@@ -28,7 +34,12 @@ function showView(drawn: Picture | undefined, view = "front", element: Element |
 beforeEach(async () => {
   newPage();
   page = await import("../../../src/mesh/control/display-freshness");
-  await connect({ stale: [{ topic: "joints", afterS: 1 }, { topic: "video/*", afterS: 2 }] } as never);
+  await connect({
+    stale: [
+      { topic: "joints", afterS: 1 },
+      { topic: "video/*", afterS: 2 },
+    ],
+  } as never);
 });
 
 test("a robot that the page does not show keeps no motion from starting", () => {
@@ -40,7 +51,11 @@ test.each([
   ["an old video", () => showView(picture(3)), "the video “Front”, which can be turned off, is 3\u202fs old"],
   ["an old drawing", () => showView(picture(3), "3d"), "the 3-D picture is 3\u202fs old"],
   ["a stored picture", () => showView(null), "the video “Front”, which can be turned off, is not live"],
-  ["a picture of unknown age", () => showView(picture(null)), "the video “Front”, which can be turned off, is not live"],
+  [
+    "a picture of unknown age",
+    () => showView(picture(null)),
+    "the video “Front”, which can be turned off, is not live",
+  ],
 ])("%s lets no motion start", async (_, show, why) => {
   await show();
   expect(page.whyFrozen(ROBOT)).toBe(`No new motion: ${why}.`);

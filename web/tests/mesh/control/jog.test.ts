@@ -2,7 +2,12 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { beforeEach, expect, test, vi } from "vitest";
-import { CommandAnswerSchema, CommandRequestSchema, JogAnswerSchema, JogRequestSchema } from "../../../src/gen/robomesh_pb";
+import {
+  CommandAnswerSchema,
+  CommandRequestSchema,
+  JogAnswerSchema,
+  JogRequestSchema,
+} from "../../../src/gen/robomesh_pb";
 import type { Notice } from "../../../src/mesh/control/control";
 import type { Pressed } from "../../../src/mesh/control/jog";
 import type { Request } from "../../console";
@@ -17,9 +22,11 @@ const alive = async () => {
   const request = await nextTo("/jog/");
   return { request, ...read(request, JogRequestSchema) };
 };
-const reply = (request: Request, values: MessageInitShape<typeof JogAnswerSchema>) => answer(request, JogAnswerSchema, values);
+const reply = (request: Request, values: MessageInitShape<typeof JogAnswerSchema>) =>
+  answer(request, JogAnswerSchema, values);
 const goesOn = (request: Request) => reply(request, { running: true, moved: 0.0123 });
-const started = async (values = {}) => answer(await nextTo("/command/"), CommandAnswerSchema, { accepted: true, ...values });
+const started = async (values = {}) =>
+  answer(await nextTo("/command/"), CommandAnswerSchema, { accepted: true, ...values });
 const last = () => told.at(-1);
 async function jogging(values = {}): Promise<Pressed> {
   const pressed = press();

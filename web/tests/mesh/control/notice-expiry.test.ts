@@ -13,7 +13,8 @@ const AT_REST = { running: false, stopped: false, positions: [0, 0] as (number |
 const sent: Notice = { kind: "done", text: "Sent: Home", target: { what: "Home", positions: [1, 2], id: 3n } };
 const THERE = { ...AT_REST, positions: [1.001, 2] };
 const done = { kind: "done", text: "Done: Home" };
-const shownFor = (notice: Notice | null, motion = AT_REST) => use(hook, notice, (each: Notice | null) => void told.push(each), motion);
+const shownFor = (notice: Notice | null, motion = AT_REST) =>
+  use(hook, notice, (each: Notice | null) => void told.push(each), motion);
 
 beforeEach(async () => {
   newPage();
@@ -64,7 +65,12 @@ test.each([
   ["at its target is done", sent, THERE, done],
   ["with a warning keeps it", { ...sent, warning: "close" }, THERE, { ...done, warning: "close" }],
   ["elsewhere has ended before it", sent, AT_REST, { kind: "refused", text: "Ended before its target: Home" }],
-  ["whose joints are not known has not arrived", sent, { ...THERE, positions: [1] }, { kind: "refused", text: "Ended before its target: Home" }],
+  [
+    "whose joints are not known has not arrived",
+    sent,
+    { ...THERE, positions: [1] },
+    { kind: "refused", text: "Ended before its target: Home" },
+  ],
   ["by a stop says nothing, the stop does", sent, { ...AT_REST, stopped: true }, null],
 ])("a motion that ends %s", async (_, notice, end, expected) => {
   expect(await motionEnds(notice as Notice, end)).toEqual([expected]);

@@ -42,7 +42,8 @@ test("who is in control has a worker that can renew the lease, and nobody else",
   renewWhileBusy();
   expect(workers).toEqual([]);
   await takeControl();
-  const { address, message } = workers[0]?.posted[0] as { address: string; message: Uint8Array };
+  const [posted] = workers[0]?.posted ?? [];
+  const { address, message } = posted as { address: string; message: Uint8Array };
   const { value } = fromBinary(FromPageSchema, message).message as { value: { key: string; payload: Uint8Array } };
   expect([new URL(address).pathname, value.key]).toEqual(["/mesh", `${ROBOT}/lease/request/li`]);
   expect(fromBinary(LeaseRequestSchema, value.payload)).toMatchObject({

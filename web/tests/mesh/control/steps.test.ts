@@ -115,7 +115,11 @@ function blur(): void {
 const key = (code: string, target: EventTarget) =>
   target.dispatchEvent(Object.assign(new Event("keydown", { bubbles: true }), { code }));
 test.each([
-  ["another pointer", () => document.body.dispatchEvent(new Event("pointerdown", { bubbles: true })), "another pointer"],
+  [
+    "another pointer",
+    () => document.body.dispatchEvent(new Event("pointerdown", { bubbles: true })),
+    "another pointer",
+  ],
   ["another key", () => key("Escape", buttons[0] as Element), "another pointer, button or key"],
   ["Enter elsewhere", () => key("Enter", buttons[1] as Element), "another pointer, button or key"],
   ["another window", blur, "another window"],
@@ -168,7 +172,11 @@ test("a dialog that is open when the step would go drops it", async () => {
   await used.at(5);
   await after(500);
   dialog.remove();
-  expect([used.now.waiting, last(), commands()]).toEqual([null, "The step that waited is not sent: a dialog opened.", []]);
+  expect([used.now.waiting, last(), commands()]).toEqual([
+    null,
+    "The step that waited is not sent: a dialog opened.",
+    [],
+  ]);
 });
 
 test("a refused step drops the one that waits, which assumed its end, and is marked until the next press", async () => {
