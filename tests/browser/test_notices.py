@@ -84,38 +84,6 @@ def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stoppe
     button(page, "Release").click()
 
 
-def test_a_motion_that_another_goes_on_from_has_not_failed(open_page):
-    page = open_page(ARM, drawn=False)
-    ready(page)
-    button(region(page, "Joints"), "5").click()
-    button(page, "waist +5°").click()
-    expect(joint_value(page, "waist")).to_have_text("5.00°")
-    expect(joints_notice(page)).to_contain_text("Done: waist")
-    # The target is reached, but the gateway still waits for the arm to settle.
-    button(page, "Home").click()
-    expect(joint_value(page, "waist")).to_have_text("0.00°")
-    button(page, "waist +5°").click()
-    expect(joints_notice(page)).to_contain_text("Done: waist")
-    expect(state_word(page)).to_have_text("Idle")
-    expect(page.get_by_role("main")).not_to_contain_text("Ended before its target")
-    page.wait_for_timeout(2000)  # longer than a message waits for news of its motion
-    expect(page.get_by_role("main")).not_to_contain_text("Ended before its target")
-    button(page, "Release").click()
-
-
-def test_a_loss_is_told_of_until_who_took_control_has_gone(open_page):
-    alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
-    take(alice, "alice")
-    bob.get_by_label("Your name").fill("bob")
-    button(bob, "Take over…").click()
-    bob.get_by_label("Reason").fill("smoke")
-    button(bob, "Take over from alice").click()
-    expect(control_notice(alice)).to_have_text("Control ended: taken by bob: smoke")
-    button(bob, "Release").click()
-    expect(who_controls(alice)).to_have_text("Nobody is in control")
-    expect(control_notice(alice)).not_to_contain_text("Control ended")
-
-
 def test_a_window_that_is_closed_has_not_given_control_back(open_page):
     alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     ready(alice, "alice")

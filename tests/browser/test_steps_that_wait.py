@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hand import KINDS, SHOW_DIALOG, UNCOVER, Hand, centre_of
+from tests.browser.hand import KINDS, Hand, centre_of
 from tests.browser.robot_page import (
     ARM,
     audited,
@@ -25,7 +25,6 @@ pytestmark = pytest.mark.browser
 
 ROBOTS = ("arm",)
 DROPPED = "The step that waited is not sent"
-BLUR = "window.dispatchEvent(new Event('blur'))"
 
 
 @pytest.fixture
@@ -92,37 +91,6 @@ def test_the_page_says_what_waits_and_where_it_ends_and_takes_no_third(steps_pag
     expect(joints_notice(page)).to_have_text(re.compile("^Done"))
     expect(state_word(page)).to_have_text("Idle")
     assert degrees(page, "waist") == pytest.approx(from_ + 10, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("do", "why"),
-    [
-        (lambda page: button(region(page, "Joints"), "1").click(), "another pointer"),
-        (lambda page: page.keyboard.press("Escape"), "another pointer"),
-        (lambda page: page.evaluate(BLUR), "another window"),
-        (lambda page: page.evaluate(SHOW_DIALOG), "a dialog"),
-    ],
-    ids=["control", "key", "blur", "dialog"],
-)
-def test_anything_else_drops_the_step_that_waits(steps_page, do, why):
-    page = steps_page
-    from_ = let_one_wait(page, "waist +5°")
-    do(page)
-    expect(joints_notice(page)).to_contain_text(f"{DROPPED}: {why}")
-    page.evaluate(UNCOVER)
-    arrives(page, from_ + 5)
-    page.wait_for_timeout(500)
-    assert degrees(page, "waist") == pytest.approx(from_ + 5, abs=0.1)
-
-
-def test_a_new_direction_replaces_the_step_that_waits(steps_page):
-    page = steps_page
-    from_ = let_one_wait(page, "waist +5°")
-    button(page, "waist −5°").click()
-    expect(joints_notice(page)).to_contain_text("1 step waits; ends at")
-    expect(joints_notice(page)).to_have_text(re.compile("^Done"))
-    expect(state_word(page)).to_have_text("Idle")
-    assert degrees(page, "waist") == pytest.approx(from_, abs=0.1)
 
 
 def test_the_end_of_a_waiting_step_of_the_tool_is_where_the_tool_arrives(steps_page):
