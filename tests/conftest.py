@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, settings
 from robomesh.contract.endpoints import router_config
 from robomesh.publications.publisher import Publisher
 from robomesh.wire.session import Session, SessionSettings
-from tests.distribution import place
+from tests import distribution
 from tests.ports import free_port
 
 T = TypeVar("T")
@@ -101,10 +101,20 @@ def shared() -> Path:
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     if config.getoption("dist") != "loadfile":
         return None
-    from tests.distribution import GroupScheduling
-
     config.option.loadscopereorder = False  # by the number of tests
-    return GroupScheduling(config, log)
+    return distribution.GroupScheduling(config, log)
+
+
+_took_s: Counter[str] = Counter()
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    _took_s[distribution.group(report.nodeid)] += report.duration
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if session.config.getoption("--keep-durations") and not hasattr(session.config, "workerinput"):
+        distribution.keep(_took_s)
 
 
 # ------------------------------------------------------------------------ --quick
@@ -122,6 +132,7 @@ _in_quick_test = False
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--quick", action="store_true", help="run only what needs no browser and no process")
+    parser.addoption("--keep-durations", action="store_true", help="write tests/durations.json")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -155,7 +166,7 @@ def why_left_out(item: pytest.Item) -> str | None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    items.sort(key=place)
+    items.sort(key=distribution.place)
     if not config.getoption("--quick"):
         return
     kept, dropped = [], []

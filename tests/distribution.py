@@ -1,36 +1,19 @@
 """Distribution of the dear tests to workers: those that share a site to one, and the longest first.
 
-A worker that begins a long file when the other has nothing left would work alone.
+A worker that begins a long file when the other has nothing left would work alone. `durations.json` keeps how
+long each group took [s]; `./dev test --keep-durations` writes it.
 """
 
-from pathlib import PurePosixPath
+import json
+from pathlib import Path, PurePosixPath
 
 import pytest
 from xdist.scheduler import LoadFileScheduling
 
-# By the processor time that they take; all others follow, in their order.
-_LONGEST_FIRST = (
-    "tests/browser/define",
-    "tests/browser/program",
-    "tests/services/test_whole_site.py",
-    "tests/services/test_define_start.py",
-    "tests/browser/test_control_of_two.py",
-    "tests/browser/test_what_the_operator_saw.py",
-    "tests/browser/test_alarms.py",
-    "tests/browser/test_robot_page.py",
-    "tests/robomesh/test_wheel.py",
-    "tests/compatibility/test_old_services.py",
-    "tests/browser/test_embedding.py",
-    "tests/browser/test_page_of_processes.py",
-    "tests/browser/test_notices.py",
-    "tests/browser/test_glance.py",
-    "tests/browser/test_nothing_moves.py",
-    "tests/browser/test_cell_on_page.py",
-    "tests/browser/test_lichtblick.py",
-    "tests/browser/test_draws.py",
-    "tests/controllers/test_conformance_of_motion.py",
-    "tests/controllers/test_conformance.py",
-)
+FILE = Path(__file__).with_name("durations.json")
+# Groups without a row took less than that.
+_LEAST_S = 2.0
+_DURATIONS: dict[str, float] = json.loads(FILE.read_text("utf-8"))
 
 
 def group(test: str) -> str:
@@ -40,10 +23,16 @@ def group(test: str) -> str:
     return str(folder) if folder.parent.name == "browser" else file
 
 
-def place(item: pytest.Item) -> int:
-    """Return where a test begins: its place in the list of the longest."""
+def place(item: pytest.Item) -> tuple[float, str]:
+    """Return what orders the tests: the longest groups first."""
     name = group(item.nodeid)
-    return _LONGEST_FIRST.index(name) if name in _LONGEST_FIRST else len(_LONGEST_FIRST)
+    return -_DURATIONS.get(name, 0.0), name
+
+
+def keep(took_s: dict[str, float]) -> None:
+    """Write the durations of these groups; those of others stay."""
+    kept = {name: round(took, 1) for name, took in (_DURATIONS | took_s).items() if took >= _LEAST_S}
+    FILE.write_text(json.dumps(dict(sorted(kept.items())), indent=1) + "\n", "utf-8")
 
 
 class GroupScheduling(LoadFileScheduling):
