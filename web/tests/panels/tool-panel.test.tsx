@@ -150,7 +150,7 @@ test.each([
   [[of("waist", 0.0199, 0.9801)], ["warning", "Waist", "1.14°", 4]],
   [[of("waist", 0.02, 0.98)], ["normal", "Waist", "1.15°", 4]],
   [[of("waist", -0.01, 1.01)], ["alarm", "Waist", "−0.57°", 0]],
-  [[of("waist + slide", 0, 0)], ["warning", "waist + slide", "0.00°", 0]],
+  [[of("waist + slide", 0.001, 0.999)], ["warning", "waist + slide", "0.06°", 0.2]],
 ])("the joint that is nearest to a limit by its share of the range is shown (%o)", (limitMargins, row) => {
   draw({ limitMargins });
   expect(margin("limit")).toEqual(row);
