@@ -57,7 +57,8 @@ test("a D-H row is Rot(z, theta) Trans(a, 0, d) Rot(x, alpha)", () => {
   const [base, first, second] = linkPlacements(start, [row, row]);
   expect(base?.elements).toEqual(new Matrix4().elements);
   const chain = [start.clone().multiply(expected), start.clone().multiply(expected).multiply(expected)];
-  for (const [i, placement] of [first, second].entries())
-    placement?.elements.forEach((each, k) => expect(each).toBeCloseTo(chain[i]?.elements[k] ?? NaN, 12));
+  const numbers = (placements: (Matrix4 | undefined)[]) =>
+    placements.map((each) => each?.elements.map((element) => Number(element.toFixed(12))));
+  expect(numbers([first, second])).toEqual(numbers(chain));
   expect(alongAxis(row).elements[14]).toBe(2);
 });

@@ -1,5 +1,6 @@
 // Lines in the 3-D view.
 
+import type { BufferGeometry, Line, LineBasicMaterial } from "three";
 import { PerspectiveCamera, Vector3 } from "three";
 import { expect, test } from "vitest";
 import type { Nearest } from "../../../src/scene/parts/lines";
@@ -101,7 +102,7 @@ test("line and label have the colour of their level, and the label is at the lin
     made.add(near(i, "x", level), 100 * i);
     made.showAt(100 * i, COLOURS);
     made.placeLabel(new PerspectiveCamera(), 200, 100);
-    const [line] = made.group.children as [{ material: { color: { getHexString: () => string } } }];
+    const line = made.group.children[0] as Line<BufferGeometry, LineBasicMaterial>;
     expect([label.dataset.level, `#${line.material.color.getHexString()}`]).toEqual([
       level,
       { normal: COLOURS.dim, warning: COLOURS.warning, alarm: COLOURS.alarm }[level],
