@@ -34,7 +34,7 @@ export const press = (text: string) => act(() => button(text).click());
 /** Send an event to what a selector finds. */
 export const send = (selector: string, event: Event) => act(() => void find(selector).dispatchEvent(event));
 
-/** Type a text into a field, in the place of what is there. */
+/** Replace the text of a field. */
 export function type(selector: string, text: string): void {
   find<HTMLInputElement>(selector).value = text;
   send(selector, new Event("input", { bubbles: true }));

@@ -1,4 +1,4 @@
-// What presence says of a robot: its live services, and whether it exists at all.
+// Presence of a robot's services, and of the robot itself.
 
 import { beforeEach, expect, test } from "vitest";
 import { connect, newPage, say } from "../console";

@@ -48,7 +48,7 @@ beforeEach(async () => {
 });
 
 const numbers = () => texts(".numbers .number");
-/** A bar's level, the measured part, the number, and how full the bar is [%]; null: there is none. */
+/** Level, measured part, number and width [%] of a bar; null: no bar. */
 function margin(name: string) {
   const row = find(`[data-margin=${name}]`);
   const bar = row.querySelector<HTMLElement>(".margin-bar > span");

@@ -1,4 +1,4 @@
-// Models of the 3-D view: loaded with patience, and painted by what is known of them.
+// Models of the 3-D view: their loading and their paint.
 
 import { BoxGeometry, Color, FrontSide, Group, LineSegments, Mesh, MeshStandardMaterial, Texture } from "three";
 import { beforeEach, expect, test, vi } from "vitest";

@@ -1,4 +1,4 @@
-// What other components add to a robot's scene, and what surrounds it.
+// Parts that other components add to a robot's scene, and its surroundings.
 
 import { Color, Group, Matrix4, type Mesh, Object3D, PerspectiveCamera, Scene } from "three";
 import type { OrbitControls } from "three/addons/controls/OrbitControls.js";
