@@ -6,6 +6,7 @@ export default defineConfig({
     environment: "happy-dom",
     reporters: ["dot"],
     testTimeout: 60_000,
+    hookTimeout: 60_000,
     unstubGlobals: true,
     restoreMocks: true,
     coverage: {

@@ -13,7 +13,6 @@ from robomesh.contract.topics import REQUESTS, TOPICS
 from robomesh.recordings.series.values import values_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.foxglove import messages as foxglove
-from tests import page_modules
 from tests.hostile import UNKNOWN, Values
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,27 +58,3 @@ def test_a_log_of_foxglove_has_an_unknown_severity_in_its_text():
 
 def test_activity_is_its_number():
     assert "77" in activity_words(schema.ControllerState(activity=UNKNOWN))
-
-
-@pytest.mark.slow
-def test_the_page_shows_numbers(tmp_path):
-    module = page_modules.bundle(
-        tmp_path,
-        mark="ui/marks/event-mark.tsx",
-        priority="ui/marks/priority-mark.tsx",
-        format="i18n/format.ts",
-    )
-    shown = page_modules.run(
-        module,
-        """
-        const { mark, priority, format } = await import(process.argv[1]);
-        console.log(JSON.stringify([
-          mark.severityMark(77).text, mark.outcomeMark(77).text, priority.priorityWord(77),
-          format.jointText({ type: 77 }, 1.5),
-        ]));
-        process.exit(0);
-        """,
-        None,
-    )
-    assert shown[:3] == ["77", "77", "77"]
-    assert shown[3].startswith("1.5000")

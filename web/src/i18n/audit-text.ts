@@ -38,7 +38,7 @@ function asked({ request, values }: AuditEntry, joints: readonly Description_Joi
   const sentence = message(`audit.${request}`);
   if (!sentence) return request;
   const complete = placeholders(sentence).every((name) => known[name]);
-  return filled(complete ? sentence : (message(`audit_without.${request}`) ?? sentence), known);
+  return complete ? filled(sentence, known) : (message(`audit_without.${request}`) ?? request);
 }
 
 /** Return the joints of a motion with their targets, or of a step with its signed change. */

@@ -37,7 +37,7 @@ export function signalText(name: string, description: Description | undefined): 
 export function fullSignalText(name: string, description: Description | undefined): string {
   const group = groupOf(name);
   const text = signalText(name, description);
-  return group === "joint" || group === "io" ? text : `${groupTitle(group)} ${text}`;
+  return ["joint", "io", name].includes(group) ? text : `${groupTitle(group)} ${text}`;
 }
 
 /** Return a signal's value in words, and its unit. */
