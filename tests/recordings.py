@@ -17,8 +17,8 @@ from mcap_protobuf.schema import register_schema
 
 from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
+from robomesh.recordings.recovery.rewrite import rewrite
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.rewrite import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.descriptions.description import load
 from robots.descriptions.glb import link_glbs

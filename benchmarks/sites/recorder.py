@@ -44,9 +44,9 @@ from robomesh.contract.endpoints import client_config
 from robomesh.contract.header import Header, pack
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.recovery.recover import State, state_of
+from robomesh.recordings.recovery.rewrite import rewrite
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.recover import State, state_of
-from robomesh.recordings.writing.rewrite import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings, open_session
 

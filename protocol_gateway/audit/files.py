@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from protocol_gateway.audit.persisted_state import starts_file
 from protocol_gateway.authority.audit_entry import NO_PREVIOUS, ChainLink, Entry, chain_link, parse_line
+from protocol_gateway.persistence.persisted_state import starts_file
 from protocol_gateway.seam.errors import AuditError
 
 # Longer than every entry: a file with one endless line must not fill the reader's memory.

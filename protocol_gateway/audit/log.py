@@ -24,8 +24,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from protocol_gateway.audit.files import Verification, older_parts, part_name, read_entries, verify
-from protocol_gateway.audit.latch_file import LatchFile, disk_problem
-from protocol_gateway.audit.persisted_state import (
+from protocol_gateway.audit.recovery import RecoveredLog, find_end
+from protocol_gateway.authority.audit_entry import GATEWAY, Entry, Outcome, chain_entry
+from protocol_gateway.persistence.latch_file import LatchFile, disk_problem
+from protocol_gateway.persistence.persisted_state import (
     LATCH_UNKNOWN,
     ROTATE,
     UNKNOWN,
@@ -35,8 +37,6 @@ from protocol_gateway.audit.persisted_state import (
     to_values,
     with_latched_stop,
 )
-from protocol_gateway.audit.recovery import RecoveredLog, find_end
-from protocol_gateway.authority.audit_entry import GATEWAY, Entry, Outcome, chain_entry
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
 from robomesh.files.atomic_write import fsync_folder

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from protocol_gateway.audit.files import first_number, lines_of, older_parts
-from protocol_gateway.audit.persisted_state import (
+from protocol_gateway.authority.audit_entry import NO_PREVIOUS, chain_link, parse_line
+from protocol_gateway.persistence.persisted_state import (
     EMPTY,
     PersistedState,
     apply_entry,
@@ -23,7 +24,6 @@ from protocol_gateway.audit.persisted_state import (
     may_change_stop,
     starts_file,
 )
-from protocol_gateway.authority.audit_entry import NO_PREVIOUS, chain_link, parse_line
 from protocol_gateway.seam.errors import AuditError
 
 # Quotes within texts are escaped, so no text matches.

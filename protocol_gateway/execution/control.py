@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from protocol_gateway.audit.latch_file import LatchFile
 from protocol_gateway.authority import audited_events, decisions, events
 from protocol_gateway.authority.admission import Admission, admit_all, wait_refusal
 from protocol_gateway.authority.audit_entry import PROGRAM
@@ -27,6 +26,7 @@ from protocol_gateway.execution.audit_trail import AuditTrail
 from protocol_gateway.execution.clocks import read_clocks
 from protocol_gateway.execution.deadlines import CommandArrivals
 from protocol_gateway.execution.motion_checks import MotionChecks
+from protocol_gateway.persistence.latch_file import LatchFile
 from protocol_gateway.seam.errors import AuditError, LinkError
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.state_messages import lease_answer

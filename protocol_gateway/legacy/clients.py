@@ -25,11 +25,11 @@ from protocol_gateway.legacy.requests import (
     asks_for_more,
 )
 from protocol_gateway.legacy.settings import LegacySettings, plain_address
-from protocol_gateway.serving.client import Client
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.unit_protocol.codes import code_table
 from protocol_gateway.unit_protocol.records import Error, asks_to_stop, write_unit
 from protocol_gateway.unit_protocol.stream import Malformed, StreamEvent, Unit, printable
+from protocol_gateway.unit_server.client import Client
 from robomesh import reason_codes as codes
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.service.health import listen_when_possible

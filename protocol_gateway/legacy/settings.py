@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from ipaddress import IPv6Address, ip_address
 
-from protocol_gateway.serving.rate_limit import Limits
+from protocol_gateway.unit_server.rate_limit import Limits
 
 
 @dataclass(frozen=True, kw_only=True)

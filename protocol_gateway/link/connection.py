@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, Self, cast
 
 from protocol_gateway.seam.errors import LinkCloggedError, LinkDownError
-from protocol_gateway.serving.sockets import configure
+from protocol_gateway.unit_server.sockets import configure
 from robomesh import reason_codes as codes
 from robomesh.reasons import Reason
 

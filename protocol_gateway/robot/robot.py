@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 from protocol_gateway.audit.log import AuditLog, Entry
-from protocol_gateway.audit.persisted_state import ROTATE
 from protocol_gateway.audit.search import Query, SearchServer, find
 from protocol_gateway.authority import events
 from protocol_gateway.authority.audit_entry import entry_message
@@ -31,6 +30,7 @@ from protocol_gateway.link.link import (
     LinkStatus,
 )
 from protocol_gateway.link.status import transition_events
+from protocol_gateway.persistence.persisted_state import ROTATE
 from protocol_gateway.robot.parts import (
     CellCheck,
     link_settings,

@@ -17,8 +17,8 @@ from robomesh import reason_codes as codes
 from robomesh.contract.topics import History, Topic
 from robomesh.reasons import Reason
 from robomesh.recordings import records
+from robomesh.recordings.recovery.recover import close_in_place
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.recover import close_in_place
 from services.recorder.settings import MIB, FreeSpace
 
 _WRITE_EVERY_S = 0.05

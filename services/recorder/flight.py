@@ -18,8 +18,8 @@ from robomesh.contract.topics import Topic
 from robomesh.errors import MessageError, RefusedError
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.names import FLIGHT_FOLDER, SUFFIX
+from robomesh.recordings.recovery.recover import State, state_of
 from robomesh.recordings.writing.capture import Capture, is_being_written
-from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder.captures import CaptureFiles, check_name
 from services.recorder.disk import error_text

@@ -38,7 +38,7 @@ class IndexingQueue:
 
     def __init__(self) -> None:
         self._jobs: asyncio.Queue[Job] = asyncio.Queue()
-        self._worker = Worker("robomesh.recordings.writing.rewrite", None, nice=10)
+        self._worker = Worker("robomesh.recordings.recovery.rewrite", None, nice=10)
         # Progress of running and waiting jobs, by the target's name: 0 to 1.
         self.progress: dict[str, float] = {}
 

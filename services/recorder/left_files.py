@@ -4,8 +4,8 @@ import fcntl
 import os
 from pathlib import Path
 
+from robomesh.recordings.recovery.recover import State, is_ours, state_of
 from robomesh.recordings.writing.capture import is_being_written
-from robomesh.recordings.writing.recover import State, is_ours, state_of
 
 _LOCK = ".lock"
 

@@ -16,8 +16,8 @@ from robomesh.reasons import Reason
 from robomesh.recordings.changes import set_labels
 from robomesh.recordings.errors import RecordingsError
 from robomesh.recordings.names import INDEXING, ROBOT_DESCRIPTION, SUFFIX
+from robomesh.recordings.recovery.recover import State
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.recover import State
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from protocol_gateway.audit.files import older_parts, read_entries, verify
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome
-from protocol_gateway.audit.persisted_state import UNKNOWN
 from protocol_gateway.audit.search import Query, find
 from protocol_gateway.authority.audit_entry import chain_link, entry_message, parse_line
+from protocol_gateway.persistence.persisted_state import UNKNOWN
 from protocol_gateway.seam.errors import AuditError
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until

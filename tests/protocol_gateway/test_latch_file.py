@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.audit.latch_file import RESERVED, SLOT_BYTES, LatchFile
 from protocol_gateway.audit.log import AuditLog, Entry, Outcome, read_entries
-from protocol_gateway.audit.persisted_state import LATCH_UNKNOWN
 from protocol_gateway.authority.lease_rules import LatchedStop
+from protocol_gateway.persistence.latch_file import RESERVED, SLOT_BYTES, LatchFile
+from protocol_gateway.persistence.persisted_state import LATCH_UNKNOWN
 from protocol_gateway.seam.errors import AuditError
 from robomesh import reason_codes as codes
 from tests.conftest import run
@@ -176,7 +176,7 @@ def test_a_disk_that_hangs_delays_no_stop_and_is_reported(path, monkeypatch):
     try:
         latch.keep(stop(1), 1)
         latch.keep(stop(2), 2)  # returns while the first is still being written
-        monkeypatch.setattr("protocol_gateway.audit.latch_file.LONGEST_WRITE_S", -1.0)
+        monkeypatch.setattr("protocol_gateway.persistence.latch_file.LONGEST_WRITE_S", -1.0)
         assert latch.problem == codes.LATCH_SLOW(name="arm.latch", seconds=-1.0)
     finally:
         goes_on.set()

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from protocol_gateway.serving.rate_limit import Budget, Limits
 from protocol_gateway.unit_protocol.stream import UnitStream
+from protocol_gateway.unit_server.rate_limit import Budget, Limits
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.protocol_gateway.gateway_site import STATE, until
 from tests.protocol_gateway.old_client import ME, Program, legacy, legacy_site, program

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 
-from protocol_gateway.serving.rate_limit import Limits
+from protocol_gateway.unit_server.rate_limit import Limits
 from tests.protocol_gateway.gateway_site import STATE, until
 from tests.protocol_gateway.old_client import ME, Program, legacy, legacy_site, program
 

@@ -5,7 +5,7 @@ from contextlib import asynccontextmanager
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh.recordings.writing.recover import State, state_of
+from robomesh.recordings.recovery.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.recorder import recorder

@@ -13,8 +13,8 @@ from robomesh import reason_codes as codes
 from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
 from robomesh.recordings.files import describe_file
+from robomesh.recordings.recovery.rewrite import rewrite
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.rewrite import rewrite
 from robomesh.schemas import robomesh_pb2 as schema
 from services.recorder import flight
 from services.recorder.settings import Flight

@@ -8,7 +8,7 @@ import signal
 import psutil
 import pytest
 
-from robomesh.recordings.writing.recover import State, state_of
+from robomesh.recordings.recovery.recover import State, state_of
 from services.recorder import indexing
 from services.recorder.indexing import IndexingQueue, Job
 from tests.robomesh.recordings.test_capture import write
@@ -38,7 +38,7 @@ def worker_process():
     """Return the worker process of this process, or None."""
     for each in psutil.Process().children():
         with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
-            if "robomesh.recordings.writing.rewrite" in each.cmdline():
+            if "robomesh.recordings.recovery.rewrite" in each.cmdline():
                 return each
     return None
 

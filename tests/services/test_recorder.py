@@ -13,8 +13,8 @@ from mcap_protobuf.decoder import DecoderFactory
 from robomesh import reason_codes as codes
 from robomesh.recordings import records
 from robomesh.recordings.files import RecordingError, describe_file
+from robomesh.recordings.recovery.recover import State, state_of
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.conftest import run
 from tests.refusals import refused

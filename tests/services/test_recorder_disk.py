@@ -7,8 +7,8 @@ import pytest
 
 from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
+from robomesh.recordings.recovery.recover import State, state_of
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.recover import State, state_of
 from services.recorder.disk import Disk
 from services.recorder.settings import FreeSpace
 

@@ -19,8 +19,8 @@ import robomesh
 from robomesh.contract.endpoints import router_config
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.recovery.recover import State, recover, state_of
 from robomesh.recordings.series.downsampling import known_values
-from robomesh.recordings.writing.recover import State, recover, state_of
 from robomesh.wire.session import SessionSettings
 from services.command_line.main import run as command
 from services.player.recording_source import RecordingSource

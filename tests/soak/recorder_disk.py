@@ -31,7 +31,7 @@ from mcap.reader import make_reader
 
 from robomesh.contract.endpoints import router_config
 from robomesh.errors import NoAnswerError
-from robomesh.recordings.writing.recover import State, state_of
+from robomesh.recordings.recovery.recover import State, state_of
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
 from tests.ports import free_port

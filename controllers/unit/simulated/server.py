@@ -10,7 +10,6 @@ from controllers.simulated.faults import Faults, copies, pieces
 from controllers.unit.simulated import unit_faults
 from controllers.unit.simulated.controller import Controller
 from controllers.unit.simulated.execution import MALFORMED
-from protocol_gateway.serving.client import Client
 from protocol_gateway.unit_protocol.records import (
     AbsolutePositions,
     Command,
@@ -20,6 +19,7 @@ from protocol_gateway.unit_protocol.records import (
     write_unit,
 )
 from protocol_gateway.unit_protocol.stream import Malformed, StreamEvent, Unit
+from protocol_gateway.unit_server.client import Client
 
 logger = logging.getLogger(__name__)
 

@@ -1,1 +1,1 @@
-"""Writing of recordings: capture, index, recover."""
+"""Writing of recordings: capture, and the writer of a file with an index."""

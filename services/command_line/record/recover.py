@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from robomesh.recordings.files import describe_file
-from robomesh.recordings.writing import recover as files
+from robomesh.recordings.recovery import recover as files
 from robomesh.recordings.writing.capture import is_being_written
 from services.command_line.terminal.options import Json
 from services.command_line.terminal.output import print_json, print_line, progress

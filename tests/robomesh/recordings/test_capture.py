@@ -14,10 +14,10 @@ from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.files import describe_file
 from robomesh.recordings.layout import layout_of
 from robomesh.recordings.names import ROBOT_DESCRIPTION
+from robomesh.recordings.recovery.recover import State, close_in_place, is_ours, recover, state_of
+from robomesh.recordings.recovery.rewrite import rewrite
 from robomesh.recordings.writing import indexed_writer
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.recover import State, close_in_place, is_ours, recover, state_of
-from robomesh.recordings.writing.rewrite import rewrite
 from tests.recordings import write_recording
 
 ABOUT = {"site": "site", "robot": "arm", "name": "trial", "started_by": "request"}

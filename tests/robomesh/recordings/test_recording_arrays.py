@@ -24,8 +24,8 @@ from robomesh.contract.header import Header
 from robomesh.contract.topics import topic
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.reading import RecordingFile
+from robomesh.recordings.recovery.recover import recover
 from robomesh.recordings.writing.capture import Capture
-from robomesh.recordings.writing.recover import recover
 from robomesh.schemas import robomesh_pb2 as schema
 from services.command_line.record.export.tables import write_table
 from services.export.span import Span

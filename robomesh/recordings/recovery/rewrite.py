@@ -1,6 +1,6 @@
 """Rewriting of one or several consecutive closed recordings: 1 MiB zstd chunks, an index, verified, renamed.
 
-`python -m robomesh.recordings.writing.rewrite` is a worker process, so that the recorder never waits for it.
+`python -m robomesh.recordings.recovery.rewrite` is a worker process, so that the recorder never waits for it.
 It reports its progress, a number from 0 to 1.
 """
 

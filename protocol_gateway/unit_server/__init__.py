@@ -1,4 +1,4 @@
-"""TCP clients of a server of units, and their limits.
+"""Parts of a TCP server of units: its clients, their limits and sockets.
 
 Used by `legacy` and by the simulated controller of the unit protocol.
 """

@@ -12,10 +12,10 @@ import contextlib
 from collections.abc import Sequence
 from typing import Protocol
 
-from protocol_gateway.serving.rate_limit import Budget, Limits
-from protocol_gateway.serving.sockets import configure
 from protocol_gateway.unit_protocol.codes import CodeTable
 from protocol_gateway.unit_protocol.stream import StreamEvent, UnitStream
+from protocol_gateway.unit_server.rate_limit import Budget, Limits
+from protocol_gateway.unit_server.sockets import configure
 
 # Small: the server must notice a client that does not read, instead of filling its buffer with old states.
 _SEND_BUFFER_BYTES = 16 * 1024

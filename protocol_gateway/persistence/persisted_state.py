@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from protocol_gateway.audit.latch_file import LatchState
 from protocol_gateway.authority.audit_entry import Entry, Outcome
 from protocol_gateway.authority.lease_rules import Authority, LatchedStop
+from protocol_gateway.persistence.latch_file import LatchState
 
 ROTATE = "ROTATE"
 UNKNOWN = "audit log damaged: whether a stop was latched is not known"

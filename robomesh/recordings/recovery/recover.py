@@ -16,8 +16,8 @@ from mcap.records import Metadata
 from robomesh.recordings import records
 from robomesh.recordings.errors import CaptureError
 from robomesh.recordings.metadata import about_name, end_record, is_about
+from robomesh.recordings.recovery.rewrite import rewrite
 from robomesh.recordings.writing.capture import is_being_written
-from robomesh.recordings.writing.rewrite import rewrite
 
 
 class State(Enum):
