@@ -241,6 +241,6 @@ export function usualLimits(type: JointType, units: Units) {
 }
 
 /** Round off the last digits, which are artefacts of binary fractions. */
-export function tidy(value: number): number {
-  return Number(value.toPrecision(12)) || 0; // and no minus zero
+export function tidy(value: number, digits = 12): number {
+  return Number(value.toPrecision(digits)) || 0; // and no minus zero
 }

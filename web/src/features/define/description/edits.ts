@@ -132,7 +132,9 @@ function linkRenamed(of: Description, old: string, name: string): void {
 /** Convert the robot to other units. */
 export function setUnits(of: Description, units: Units): void {
   const length = (value: number) => tidy((value * metres(of.units)) / metres(units));
-  const angle = (value: number) => tidy((value * radians(of.units)) / radians(units));
+  // With more digits of a radian than of a degree, 90° is 90° again after a change to radians and back.
+  const digits = units.angle === "rad" ? 15 : 12;
+  const angle = (value: number) => tidy((value * radians(of.units)) / radians(units), digits);
   const lengths = (values: Triple) => values.map(length) as Triple;
   const place = (pose: Pose) => {
     pose.xyz = lengths(pose.xyz);

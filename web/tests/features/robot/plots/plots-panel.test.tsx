@@ -13,7 +13,7 @@ import { hide, show } from "../../../shown";
 
 type Values = (null | number | undefined)[];
 
-/** What the page tells uPlot. */
+/** Options that the page gives uPlot. */
 interface Options {
   scales: { x: { range: () => [number, number] } } & Record<string, { range: (_: null, ...of: unknown[]) => number[] }>;
   axes: { values: (_: unknown, at: number[]) => string[]; splits?: (self: unknown) => number[] }[];
