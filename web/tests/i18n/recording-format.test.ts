@@ -115,6 +115,7 @@ test.each([
   [{ case: "number", value: 1.25 }, "kg", "1.250", "kg"],
   [{ case: "number", value: Math.PI }, "rad", "180.00", "°"],
   [{ case: "number", value: 3 }, "", "3", ""],
+  [{ case: "number", value: 3 }, "kg", "3.000", "kg"],
   [{ case: "number", value: -0.5 }, "", "−0.500", ""],
   [{ case: undefined }, "V", "–", ""],
 ] as const)("the value %o in %j is %s %s", async (value, unit, text, shown) => {

@@ -1,12 +1,13 @@
 // Alarms, events and audit entries as sentences in the page's language.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { create } from "@bufbuild/protobuf";
+import { create, fromBinary } from "@bufbuild/protobuf";
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { afterEach, expect, test } from "vitest";
 import {
   AlarmSchema,
   AuditEntrySchema,
+  DescriptionSchema,
   EventSchema,
   AuditEntry_Outcome as Outcome,
   Event_Severity as Severity,
@@ -16,6 +17,7 @@ import { entrySentence } from "../../src/i18n/audit-text";
 import { eventText } from "../../src/i18n/event-text";
 import { stampWhen, whenText } from "../../src/i18n/format";
 import { showFirstLanguage } from "../../src/i18n/texts";
+import { ARM, messages, payloads } from "../recorded";
 
 const AT = 1_795_932_131_000;
 const timestamp = timestampFromMs(AT);
@@ -101,6 +103,12 @@ test.each<[string, MessageInitShape<typeof EventSchema>, string, string | RegExp
     "told",
     /^与控制器断开：.*wang.*。$/,
   ],
+  [
+    "a warning with a reason",
+    { code: "link.silent", severity: Severity.WARNING, reason: HELD },
+    "told",
+    /^控制器无数据：/,
+  ],
   ["an unknown alarm with a reason", { code: "x.y", severity: Severity.ERROR, reason: HELD }, "told", "told"],
   [
     "an event that is its reason",
@@ -159,4 +167,19 @@ test("an alarm is translated with its cause, and its advice too", async () => {
   expect(alarmText(create(AlarmSchema, { code: "link.down" }))).toBe("与控制器断开");
   expect(alarmText(create(AlarmSchema, { code: "x.y", cause: HELD }))).toBeNull();
   expect(alarmAdvice("link.down", "check it")).toMatch(/^检查控制器/);
+});
+
+test("a real robot's requests are told as sentences", () => {
+  const joints = payloads(`${ARM}/description`).flatMap((each) => fromBinary(DescriptionSchema, each).joints);
+  const samples = messages.flatMap(({ message }) =>
+    message.case === "sample" && message.value.key === `${ARM}/audit` ? [message.value] : [],
+  );
+  const told = samples
+    .filter(({ live }) => live)
+    .map(({ payload }) => entrySentence(fromBinary(AuditEntrySchema, payload), joints));
+  const requests = ["take control", "waist +5.00°", "stop request", "reset of stop 1", "release control"];
+  expect(told).toEqual(expect.arrayContaining(requests.map((what) => `li: ${what}`)));
+  expect(told.find((each) => each.includes("400"))).toMatch(
+    /^li: move to waist 400\.00°.* – joint waist at 400\.00° is beyond/,
+  );
 });

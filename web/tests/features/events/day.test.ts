@@ -138,6 +138,7 @@ test("time that no source describes is unknown", () => {
     ...known,
     unknown: 100_000,
   });
+  expect(page.totalsOf(of({ events, eventsFrom: DAY.from + 15_000 }))).toEqual({ ...known, unknown: WHOLE });
   expect(page.totalsOf(of({ now: DAY.from - 5 })).unknown).toBe(0);
 });
 
@@ -151,4 +152,34 @@ test("a table holds no formula, and every line once", () => {
   expect(row).not.toContain(',"=');
   expect(row).toContain('""quoted""');
   expect(page.exported(lines, ["head"], String, false)).toMatch(/^head\n\n/);
+});
+
+test("a robot that is stopped without a link, or stops its program, counts once: offline, stopped, then in a program", () => {
+  const audit = [entry(0, "RUN_PROGRAM"), entry(10, "STOP"), entry(40, "RESET")];
+  const events = [event(20, "link.lost", Severity.ERROR), event(30, "link.up", Severity.INFO)];
+  const totals = { program: 10_000, stopped: 20_000, offline: 10_000, unknown: WHOLE - 40_000 };
+  expect(page.totalsOf(of({ audit, events }))).toEqual(totals);
+});
+
+test("a request that is refused again and again is one line that needs attention", () => {
+  const refused = { outcome: Outcome.REFUSED, text: "busy" };
+  const audit = [entry(1, "HOME", refused), entry(2, "HOME", refused), entry(3, "HOME")];
+  const lines = page.linesOf(of({ audit })).map(({ text, bad }) => [text, bad]);
+  expect(lines).toEqual([
+    ["li: Home – busy", true],
+    ["li: Home", false],
+  ]);
+});
+
+test("an alarm is told with how long it lasted, or who acknowledged it; what the audit log says is told once", () => {
+  const events = [
+    event(1, "joints.limit", Severity.WARNING, { text: "elbow at its limit" }),
+    event(3605, "joints.limit.over", Severity.INFO),
+    event(5, "alarm.acknowledged", Severity.INFO, { text: "li acknowledged it" }),
+    event(6, "stop.latched", Severity.ERROR),
+    event(90_000, "link.down"),
+  ];
+  const texts = page.linesOf(of({ events })).map(({ text }) => text);
+  expect(texts).toEqual(["elbow at its limit (over after 1 h 0 min)", "li acknowledged it"]);
+  expect(page.lastedText(9400)).toBe("9 s");
 });

@@ -1,7 +1,7 @@
 // The state of a robot in words: what a person must see first, and why nothing moves.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { create } from "@bufbuild/protobuf";
+import { create, fromBinary } from "@bufbuild/protobuf";
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
 import { beforeEach, expect, test } from "vitest";
 import {
@@ -21,6 +21,7 @@ import { t } from "../../../src/i18n/texts";
 import { hello } from "../../../src/mesh/console/connection";
 import * as page from "../../../src/mesh/state/robot-state";
 import { latest } from "../../latest";
+import { ARM, payloads } from "../../recorded";
 
 type Init = MessageInitShape<typeof ControllerStateSchema>;
 const at = (second: number) => timestampFromMs(1e12 + 1000 * second);
@@ -226,5 +227,14 @@ test("a replay has the recorded state only while it plays", () => {
   expect(word({ playing: false, positionS: 9.995 })).toBe("state_replay_ended");
   expect(page.replayWord(latest(create(ReplayStateSchema, { playing: true, durationS: 9 })), undefined).word).toBe(
     "state_replay_paused",
+  );
+});
+
+test("a real robot that homes, moves, is stopped and reset has the words for that, one after the other", () => {
+  const words = payloads(`${ARM}/controller`).map(
+    (each) => page.stateWord(latest(fromBinary(ControllerStateSchema, each))).word,
+  );
+  expect(words.join(" ")).toMatch(
+    /^state_idle.* state_homing.* state_moving.* state_stopping.* state_stopped.* state_idle$/,
   );
 });
