@@ -41,10 +41,12 @@ test("a look is what the camera has then, and is nobody's move", () => {
     ],
     ...[false, false],
   ]);
+  const gone = vi.spyOn(viewpoint.controls, "dispose");
   viewpoint.controls.dispatchEvent({ type: "start" });
   expect(viewpoint.touched).toBe(true);
   viewpoint.look(FRONT);
   expect(viewpoint.touched).toBe(false);
+  expect(gone).toHaveBeenCalledOnce(); // otherwise two follow the pointer
 });
 
 test("the keyboard turns the camera about its target, at the same distance", () => {

@@ -35,6 +35,7 @@ const place = (x: number) =>
 const ghostAt = (x: number) => new Map([["hand", new Matrix4().setPosition(x, 0, 0)]]);
 const [LINK, GHOST] = [0, 1];
 function look(of: number) {
+  scene.updateMatrixWorld(true); // as drawing does
   const group = scene.children[of];
   const part = group?.getObjectByProperty("type", "Mesh") as Mesh<never, MeshStandardMaterial>;
   const { color, opacity } = part.material;
@@ -93,6 +94,9 @@ test("a red link's visible ghost is red, or without one the link itself", async 
   expect([look(LINK)[1], look(GHOST)]).toEqual(["#ff0000", [false, "#ff0000", 0.75]]);
   arm.showGhost(ghostAt(1));
   expect(look(LINK)[1]).not.toBe("#ff0000");
+  changed.mockReset();
+  arm.showGhost(ghostAt(2));
+  expect(changed).toHaveBeenCalledOnce(); // it is painted no more than needed
   arm.showGhost(null);
   expect(look(LINK)[1]).toBe("#ff0000");
   arm.setRed(new Set(["arm2/hand"]));

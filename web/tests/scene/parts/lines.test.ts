@@ -54,7 +54,8 @@ function clearance() {
   const made = new ClearanceLine(label);
   const shown = () => {
     made.placeLabel(new PerspectiveCamera(), 200, 100);
-    return label.hidden || !made.group.visible ? null : label.textContent;
+    expect(made.group.visible).toBe(!label.hidden);
+    return label.hidden ? null : label.textContent;
   };
   return { made, label, shown };
 }
