@@ -229,6 +229,7 @@ test("another theme paints the surroundings anew, and draws them", async () => {
 
 test("named frames have axes only while a person wants them", async () => {
   const shown = () => ofKind("AxesHelper").map(({ visible, position }) => [visible, position.x]);
+  expect(shown()).toEqual(Array(2).fill([false, 0]));
   sendFrames(1);
   await pass(200);
   expect(shown()).toEqual([
@@ -289,6 +290,7 @@ test("slow frames are drawn coarser, without shadows, and once more in full at r
     await pass(500);
   }
   expect([Number(canvas.dataset.pixelRatio) < 2, light().castShadow]).toEqual([true, false]);
+  expect(gl.setPixelRatio).toHaveBeenLastCalledWith(Number(canvas.dataset.pixelRatio));
   await pass(4000);
   expect(canvas.dataset.pixelRatio).toBe("2");
   const rested = renders();

@@ -67,14 +67,14 @@ test("a move is reported once, when the camera rests, and its report moves nothi
   camera.show(FRONT, null);
   rest();
   expect(moved).not.toHaveBeenCalled();
-  camera.viewpoint.turn(Math.PI / 2, 0);
+  camera.viewpoint.turn(1, 0);
   vi.advanceTimersByTime(500);
   expect(moved).not.toHaveBeenCalled(); // it may go on
   rest();
   expect(moved.mock.calls).toEqual([
-    [{ view: "front", pose: [0, 2, 0, 0, 0, 0.5].map((each) => expect.closeTo(each)) }],
+    [{ view: "front", pose: [2 * Math.cos(1), 2 * Math.sin(1), 0, 0, 0, 0.5].map((each) => expect.closeTo(each, 3)) }],
   ]);
-  camera.viewpoint.turn(0.0001, 0); // nobody sees it
+  camera.viewpoint.turn(0.00001, 0); // nobody sees it
   camera.show(FRONT, moved.mock.calls[0]?.[0].pose);
   const looks = vi.spyOn(camera.viewpoint, "look");
   camera.show(FRONT, moved.mock.calls[0]?.[0].pose);
@@ -83,6 +83,18 @@ test("a move is reported once, when the camera rests, and its report moves nothi
   camera.viewpoint.turn(1, 0);
   rest();
   expect(moved).toHaveBeenCalledTimes(2);
+  camera.show(view("side", { eye: { y: 3 } }), null); // no person's move
+  rest();
+  expect(moved).toHaveBeenCalledTimes(2);
+});
+
+test("a flat view is not turned, and a camera that has ended looks at nothing", () => {
+  camera.show(FLAT, null);
+  const before = eye();
+  camera.viewpoint.turn(1, 0);
+  expect(eye()).toEqual(before);
+  camera.dispose();
+  expect(vi.getTimerCount()).toBe(0);
 });
 
 test.each([
