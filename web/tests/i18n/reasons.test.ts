@@ -86,6 +86,25 @@ test.each<[string, Init, string, string]>([
   expect(await shown(reason)).toEqual([english, chinese]);
 });
 
+test("a line to be typed into a site file keeps its numbers", async () => {
+  const values = { height_mm: "-240", below_mm: "-250" };
+  const text = "if the floor is lower than -240 mm, write floor = -250.0 for the robot";
+  const [english, chinese] = await shown({ code: "check.floor_advice", values, text });
+  expect(english).toBe(text.replace("-240", "−240"));
+  expect(chinese).toMatch(/−240 mm.*floor = -250\.0/);
+});
+
+test("only whole numbers that are values get the page's minus sign", async () => {
+  const text = "-7 is none of -71, a-7 and 1.-7";
+  expect((await shown({ code: "x", values: { given: "-7" }, text }))[0]).toBe(text.replace("-7", "−7"));
+});
+
+test("a value has the words of its language, also with a robot's name", async () => {
+  const values = { work: "the controller of arm1", seconds: "0.50" };
+  const [, chinese] = await shown({ code: "gateway.occupied", values, text: "occupied" });
+  expect(chinese).toMatch(/^arm1 的控制器 占用/);
+});
+
 test("a hyphen of the sentence stays", async () => {
   const values = { word: "speed", name: "x", given: "-7", most: "5" };
   const text = "'speed': x is -7; must be between -5 and 5";
