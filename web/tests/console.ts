@@ -137,7 +137,7 @@ export function publish<S extends DescMessage>(
 }
 let published = 0n;
 
-/** Let time pass [s] in which the console sends a message now and then, as it does. */
+/** Let time pass [s] in which the console goes on sending. */
 export async function stayConnected(seconds: number): Promise<void> {
   for (let left = 1000 * seconds; left > 0; left -= 200) {
     await vi.advanceTimersByTimeAsync(Math.min(200, left));
