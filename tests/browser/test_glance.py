@@ -5,15 +5,12 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from protocol_gateway.authority import lease_rules
 from robomesh.contract.keys import WHOLE_SITE
 from tests.browser.rendering import rendering
 from tests.browser.robot_page import (
     ARM,
     PAGES,
     button,
-    control_notice,
-    control_requests,
     joint_value,
     joint_values,
     region,
@@ -134,19 +131,6 @@ def test_the_bar_leads_to_another_robot_by_a_few_letters(open_page):
     page.keyboard.type("pt6")
     page.keyboard.press("Enter")
     expect(page).to_have_url(re.compile("#/program/hall/pt600$"))
-
-
-def test_a_request_for_control_that_expires_says_so_to_its_operator(open_page, monkeypatch):
-    monkeypatch.setattr(lease_rules, "ASKED_FOR_S", 2.0)
-    mine, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
-    take(mine, "li")
-    other.get_by_label("Your name").fill("bob")
-    button(other, "Ask for control").click()
-    other.get_by_label("Reason").press("Enter")
-    expect(control_requests(mine)).to_contain_text("bob asks for control")
-    expect(control_notice(other)).to_contain_text("li did not answer your request")
-    expect(control_requests(mine)).to_have_count(0)
-    button(mine, "Release").click()
 
 
 def test_a_robot_that_does_not_exist_is_said_at_once_without_any_control_before(open_page):
