@@ -2,14 +2,12 @@
 
 import csv
 import logging
+import subprocess
+import sys
 import tracemalloc
 
 import numpy as np
 import pytest
-from foxglove import open_mcap
-from foxglove.channels import JointStatesChannel
-from foxglove.mcap import MCAPCompression, MCAPWriteOptions
-from foxglove.messages import JointState, JointStates
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates as JointStatesMessage
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.reader import make_reader
@@ -170,15 +168,28 @@ def test_another_programs_file_with_two_robots_and_json_is_read_as_far_as_it_can
     assert recording.values("a/joints/one/position")["a/joints/one/position"].values.tolist() == [0, 1, 2]
 
 
-@pytest.mark.parametrize("compression", [MCAPCompression.Zstd, MCAPCompression.Lz4, None])
+# In a process of its own: the SDK numbers files and the clients of every server of a process together.
+SDK = f"""
+import sys
+from foxglove import open_mcap
+from foxglove.channels import JointStatesChannel
+from foxglove.mcap import MCAPCompression, MCAPWriteOptions
+from foxglove.messages import JointState, JointStates
+compression = getattr(MCAPCompression, sys.argv[2], None)
+with open_mcap(sys.argv[1], writer_options=MCAPWriteOptions(compression=compression)):
+    channel = JointStatesChannel("/left/joint_states")
+    for number in range(500):
+        moved = [JointState(name="a", position=number), JointState(name="b", velocity=1.0)]
+        channel.log(JointStates(joints=moved), log_time={START_NS} + number * 10_000_000)
+    channel.close()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compression", ["Zstd", "Lz4", "none"])
 def test_a_file_of_foxgloves_sdk_is_read(tmp_path, compression):
     path = tmp_path / "sdk.mcap"
-    with open_mcap(path, writer_options=MCAPWriteOptions(compression=compression)):
-        channel = JointStatesChannel("/left/joint_states")
-        for number in range(500):
-            moved = [JointState(name="a", position=number), JointState(name="b", velocity=1.0)]
-            channel.log(JointStates(joints=moved), log_time=START_NS + number * 10_000_000)
-        channel.close()
+    subprocess.run([sys.executable, "-c", SDK, path, compression], check=True, timeout=60)
     recording = robomesh.open_recording(path)
     states = recording.joints("left/joint_states")
     assert states.names == ("a", "b")
