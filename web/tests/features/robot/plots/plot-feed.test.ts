@@ -123,7 +123,7 @@ test("a delayed sample is plotted when it was measured, also by a clock that is 
   await stayConnected(0.3);
   send(2, { timeMs: Date.now() + wrong - 200 });
   const buckets = feed.buckets(WAIST, 60);
-  expect(buckets?.newest(first + 0.11, 0.02)).toEqual({ low: 2, high: 2 });
+  expect(buckets?.newest(first + 0.2, 0.18)).toEqual({ low: 2, high: 2 });
   expect(buckets?.newest(now(), 0.15)).toBeNull();
   expect(feed.liveFrom(WAIST)).toBeCloseTo(first, 3);
 });
