@@ -110,7 +110,8 @@ def test(arguments: list[str]) -> int:
     write_types()
     coverage = () if arguments else ("--coverage",)
     vitest = [_node_program(), MODULES / "vitest" / "vitest.mjs", "run", *coverage, *arguments]
-    status = subprocess.run(vitest, cwd=PAGE, env=_environment(), check=False).returncode
+    plain = {} if sys.stdout.isatty() else {"NO_COLOR": "1", "FORCE_COLOR": "0"}
+    status = subprocess.run(vitest, cwd=PAGE, env=_environment() | plain, check=False).returncode
     if coverage and not status:
         for row in coverage_by_folder(
             json.loads((MODULES / ".coverage" / "coverage-summary.json").read_text())
