@@ -63,6 +63,7 @@ def test_axe_finds_nothing_serious_on_any_page_and_a_chinese_page_is_chinese(
     )
     page.reload()
     page.wait_for_function("language => document.documentElement.lang.startsWith(language)", arg=language)
+    assert page.evaluate("document.documentElement.dataset.theme") == theme
     found = {}
     for path, name in PICTURED.items():
         visit(page, path)

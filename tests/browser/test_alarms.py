@@ -1,4 +1,4 @@
-"""The page of an arm that does not obey: ignored stops, faults, local mode."""
+"""The page of an arm that does not obey: ignored stops, faults."""
 
 import re
 
@@ -80,23 +80,3 @@ def test_a_controllers_own_fault_can_be_reset_and_nothing_else_is_offered(open_p
     with fault(plant, "fault"):
         expect(state_word(page)).to_have_text("Fault")
         assert serious(page) == []
-
-
-def test_in_local_mode_the_page_says_so_and_offers_no_motion(open_page, plant):
-    page = open_page(ARM, drawn=False)
-    ready(page)
-    with fault(plant, "local"):
-        expect(joints_notice(page)).to_contain_text("the controller is in local mode")
-        expect(button(page, "Home")).to_be_disabled()
-    expect(button(page, "Home")).to_be_enabled()
-    button(page, "Release").click()
-
-
-def test_a_robot_that_is_not_there_is_said_with_those_that_are(open_page):
-    page = open_page("#/hall/nope", drawn=False)
-    expect(page.get_by_role("heading", level=1)).to_have_text("There is no robot nope at hall.")
-    expect(page.get_by_role("main").get_by_role("listitem")).to_have_text(["hall / arm", "hall / pt600"])
-    expect(button(page, "Take control")).to_have_count(0)
-    assert serious(page) == []
-    page.get_by_role("link", name="hall / arm").click()
-    expect(state_word(page)).to_be_visible()

@@ -81,24 +81,6 @@ def test_one_asks_and_is_handed_control(open_arm):
     button(bob, "Release").click()
 
 
-def test_an_offer_can_be_put_off_and_withdrawn(open_arm):
-    alice, bob = open_arm(), open_arm()
-    take(alice, "alice")
-    ask(bob, "bob")
-    answer(alice, "Hand over to bob")
-    answer(bob, "Not now")
-    expect(control_requests(bob)).to_have_count(0)
-    expect(control_requests(alice)).to_contain_text("Offered to bob, no answer yet")
-    answer(alice, "Withdraw")
-    expect(control_notice(alice)).to_have_text("Offer withdrawn.")
-    # She has answered him: his request does not come back. He sees how long ago he asked.
-    expect(control_requests(alice)).to_have_count(0)
-    expect(control_requests(bob)).to_have_text(
-        re.compile(r"You asked alice for control \d+\ss ago; no answer yet")
-    )
-    button(alice, "Release").click()
-
-
 def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
     alice, bob = open_arm(), open_arm()
     take(alice, "alice")
@@ -231,10 +213,3 @@ def test_space_on_a_step_button_stops_and_steps_nothing(open_arm, plant):
     assert audited(plant, "MOVE_RELATIVE") == moves
     reset_stop(page)
     expect(button(page, "waist +1°")).to_be_enabled()
-
-
-def test_without_control_no_step_can_be_pressed(open_arm):
-    page = open_arm()
-    step = re.compile(r"[+−]\d")
-    expect(page.get_by_role("button", name=step)).to_have_count(10)
-    expect(page.get_by_role("button", name=step, disabled=False)).to_have_count(0)

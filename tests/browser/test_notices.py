@@ -10,17 +10,12 @@ from tests.browser.robot_page import (
     answers_of,
     button,
     control_notice,
-    events,
-    joint_value,
-    joints_notice,
     move_slowly,
     ready,
     region,
     reset_stop,
     set_speed,
     stand_still,
-    state_word,
-    stop_button,
     stop_panel,
     take,
     who_controls,
@@ -37,7 +32,7 @@ def speed(page):
 
 
 def speed_hint(page):
-    return region(page, "Control").get_by_role("status").filter(has_text=re.compile("^(Low|Not sent yet)"))
+    return region(page, "Control").get_by_role("status").filter(has_text=re.compile("^Low"))
 
 
 def test_everybody_sees_the_speed_that_was_set_and_a_low_one_stands_out(open_page):
@@ -48,40 +43,10 @@ def test_everybody_sees_the_speed_that_was_set_and_a_low_one_stands_out(open_pag
     expect(speed(bob)).to_have_text(re.compile(r"2\s%"))
     expect(speed_hint(bob)).to_have_text("Low: the arm moves slowly.")
     take(bob, "bob")
-    slider = bob.get_by_label("Speed")
-    slider.press("ArrowRight")
-    expect(speed(bob)).to_have_text(re.compile(r"3\s%"))
-    expect(speed_hint(bob)).to_have_text(re.compile(r"Not sent yet: Enter sends 3\s%"))
-    slider.press("Escape")
-    expect(speed(bob)).to_have_text(re.compile(r"2\s%"))
     set_speed(bob, 100)
     expect(speed(alice)).to_have_text(re.compile(r"100\s%"))
     expect(speed_hint(alice)).to_have_count(0)
     button(bob, "Release").click()
-
-
-def test_what_was_sent_is_done_when_the_arm_is_there_and_gone_when_it_was_stopped(open_page):
-    page = open_page(ARM, drawn=False)
-    ready(page)
-    notice = joints_notice(page)
-    handle = page.get_by_role("slider", name="Target of waist")
-    handle.press("PageUp")
-    handle.press("Enter")
-    expect(notice).to_contain_text("Sent: waist")
-    expect(notice).to_contain_text("Done: waist")
-    button(page, "Home").click()
-    expect(control_notice(page)).to_have_text("Sent: Home")
-    expect(control_notice(page)).to_have_text("Done: Home")
-    handle.press("PageUp")
-    handle.press("Enter")
-    expect(state_word(page)).to_have_text("Moving")
-    stop_button(page).click()
-    expect(state_word(page)).to_have_text("Stopped")
-    expect(page.get_by_role("main")).not_to_contain_text("Sent: ")
-    asked = re.compile(r"li asked for a stop at \d\d:\d\d:\d\d[+-]\d\d:\d\d\.")
-    expect(events(page).filter(has_text=asked)).not_to_have_count(0)
-    reset_stop(page)
-    button(page, "Release").click()
 
 
 def test_a_window_that_is_closed_has_not_given_control_back(open_page):
@@ -143,25 +108,3 @@ def test_a_busy_page_keeps_control_and_a_blocked_one_has_lost_it_after_five_seco
     block(page, 5)
     expect(control_notice(page)).to_contain_text("too slow")
     expect(holder).to_have_text("Nobody is in control")
-
-
-def test_an_exact_target_can_be_typed_and_what_is_none_is_refused_in_words(open_page):
-    page = open_page(ARM, drawn=False)
-    ready(page)
-    notice = joints_notice(page)
-    value = page.get_by_label("Type a target of waist")
-    value.click()
-    value.fill("12,5")
-    expect(notice).to_have_text("Target waist: 12.50°, not sent yet")
-    value.press("Enter")
-    expect(joint_value(page, "waist")).to_have_text("12.50°")
-    expect(notice).to_have_text("Done: waist 12.50°")
-    for text, expected in (
-        ("200", "joint waist at 200.00° is beyond its limit 150.00°"),
-        ("x", "“x” is no number"),
-    ):
-        value.click()
-        value.fill(text)
-        value.press("Enter")
-        expect(notice).to_contain_text(f"Not sent: {expected}")
-    button(page, "Release").click()
