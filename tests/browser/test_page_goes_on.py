@@ -1,4 +1,4 @@
-"""The page after a lost connection, a sleeping machine, missing files or a wrong link."""
+"""The page after a lost connection, missing files or a wrong link."""
 
 import re
 
@@ -19,16 +19,15 @@ from tests.browser.robot_page import (
 
 pytestmark = pytest.mark.browser
 
-# A connection through which nothing passes any more, a machine that sleeps, and time that passes.
+# Connections through which nothing passes any more.
 LINE_DEAD, STOPS_DEAD = "sockets.at(-1).dead = true", "stopSockets.at(-1).dead = true"
-DEAD, SLEPT, PASSED = f"{LINE_DEAD}; {STOPS_DEAD}", "wall += {}", "steady += {}"
+DEAD = f"{LINE_DEAD}; {STOPS_DEAD}"
 WORLD = """
 window.sockets = [];
 window.stopSockets = [];
-window.wall = window.steady = 0;
-const [date, now] = [Date.now.bind(Date), performance.now.bind(performance)];
-Date.now = () => date() + wall + steady;
-performance.now = () => now() + steady;
+window.wall = 0;
+const date = Date.now.bind(Date);
+Date.now = () => date() + wall;
 window.WebSocket = class extends WebSocket {
   constructor(...values) {
     super(...values);
@@ -52,25 +51,6 @@ def open_idle(open_page):
     page.reload()
     expect(state_word(page)).to_have_text("Idle")
     return page
-
-
-def test_a_line_that_died_in_silence_is_told_and_opened_anew_and_sleep_makes_nothing_young(open_page):
-    page = open_idle(open_page)
-    expect(page.get_by_role("main")).not_to_contain_text("stale")
-    page.evaluate(DEAD)
-    page.evaluate(SLEPT.format(3600e3))
-    expect(page.get_by_role("main")).to_contain_text(re.compile(r"stale 6\d\smin"))
-    expect(state_word(page)).to_have_text("Stale")
-    lost = page.get_by_role("alert").filter(has_text="No connection to the console since")
-    expect(lost).to_have_count(0)
-    page.evaluate(PASSED.format(6e3))
-    until(page, lambda: page.evaluate("sockets[0].lost > 0"))  # it asks whether anybody is there
-    page.evaluate(PASSED.format(16e3))
-    until(page, lambda: page.evaluate("sockets.length > 1"))
-    page.evaluate("steady = 0")  # no source is behind by it
-    expect(lost).to_have_count(0)
-    expect(state_word(page)).to_have_text("Idle")
-    expect(page.get_by_role("main")).not_to_contain_text("stale")
 
 
 def test_a_stop_request_that_a_dead_line_swallowed_is_sent_by_another(open_page):

@@ -117,29 +117,6 @@ def test_an_operator_signs_in_has_control_in_its_own_name_and_signs_out_in_all_t
     expect(who_controls(page)).to_have_text("Nobody is in control")
 
 
-def test_the_page_counts_the_seconds_until_the_next_attempt_and_shows_an_unknown_code_in_english(open_tab):
-    page = open_tab()
-    expect(page.get_by_role("heading", name="Console of hall")).to_be_visible()
-    sentence = "too many attempts: try again in 40 s"
-    wait = {"code": "account.wait", "values": {"seconds": "40"}, "causes": [], "text": sentence}
-    page.route("**/account/sign-in", lambda route: route.fulfill(status=429, json=answer(wait, seconds=40)))
-    sign_in(page, "li")
-    counted = re.compile(r"^Not signed in: too many attempts: try again in [123]\d s$")
-    expect(page.get_by_role("alert")).to_have_text(counted)
-    expect(button(page, "Sign in")).to_be_disabled()
-    page.reload()
-    newer = {"code": "account.later", "values": {}, "causes": [], "text": "the moon is full"}
-    page.unroute("**/account/sign-in")
-    page.route("**/account/sign-in", lambda route: route.fulfill(status=403, json=answer(newer)))
-    sign_in(page, "li")
-    expect(page.get_by_role("alert")).to_have_text("Not signed in: the moon is full")
-
-
-def answer(refusal, **more):
-    """Return a refusal of the console as it answers it."""
-    return {"error": "a word", "text": refusal["text"], "refusal": refusal, **more}
-
-
 def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_tab, plant):
     page = open_tab()
     sign_in(page, "zhao")
@@ -149,17 +126,6 @@ def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_t
     expect(stop_notice(page)).to_contain_text(re.compile("Stop sent to hall/arm"))
     # The stop went first; it is written down after it.
     wait_until(lambda: "zhao.hall" in asked_by(plant, "STOP"), what="the audit log does not name zhao.hall")
-
-
-def test_who_is_disabled_is_told_so_and_sees_nothing_more(open_tab, accounts):
-    page = open_tab()
-    sign_in(page, "zhao")
-    expect(joint_values(page).first).to_be_visible()
-    change_account(accounts, "disable", "zhao")
-    expect(region(page, "Sign in")).to_contain_text("this account was disabled")
-    expect(region(page, "Sign in")).to_contain_text("nothing of it would be live")
-    expect(joint_values(page)).to_have_count(0)
-    change_account(accounts, "enable", "zhao")
 
 
 def test_who_becomes_a_monitor_is_told_so_and_so_is_everybody_else(open_tab, accounts):
