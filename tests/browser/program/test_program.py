@@ -155,7 +155,7 @@ def test_a_program_runs_or_is_stopped_and_everybody_sees_how_far_it_is_and_what_
     button(page, "Release").click()
 
 
-def test_points_are_taught_named_shown_and_taken_back_and_the_draft_outlives_a_reload(open_page):
+def test_points_are_taught_named_shown_and_taken_back(open_page):
     page = open_page(PAGE, drawn=False)
     write(page, "# mine\nhome\n")
     field = page.get_by_role("textbox", name="Program text")
@@ -175,17 +175,6 @@ def test_points_are_taught_named_shown_and_taken_back_and_the_draft_outlives_a_r
     expect(region(page, "Teach")).to_contain_text("still used in line")
     button(page, "Undo").click()
     expect(button(page, "Rename part")).to_be_visible()
-    kept = field.input_value()
-    page.reload()
-    expect(field).to_have_value(kept)
-    page.evaluate("location.hash = '#/program/test/nobody'")
-    expect(page.get_by_role("heading", level=1)).to_have_text("There is no robot nobody at test.")
-    page.evaluate(f"location.hash = '{PAGE}'")
-    expect(field).to_have_value(kept)
-    field.press("Control+End")
-    field.type("# more")
-    page.reload()
-    expect(field).to_have_value(f"{kept}# more")
 
 
 def test_a_phone_shows_programs_in_one_column_and_axe_finds_nothing_serious(open_page):
