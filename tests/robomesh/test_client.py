@@ -36,7 +36,7 @@ def mesh(site):
 
 
 @pytest.fixture
-def robot(mesh):
+def robot(mesh, site):
     """The arm, at rest and without a latched stop afterwards."""
     deadline = time.monotonic() + WAIT_S
     robot = mesh.robot("arm")
@@ -46,7 +46,10 @@ def robot(mesh):
     with robot.control("test", take="end of the test") as arm:
         if robot.last("controller").message.HasField("stop"):
             arm.reset()
-        arm.speed(100)
+        try:
+            arm.speed(100)
+        except robomesh.RobomeshError as error:
+            raise AssertionError("\n".join(site.log[-40:])) from error  # why its own control ended
 
 
 def test_joint_states_arrive_with_time_degrees_and_age(robot):
