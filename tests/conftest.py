@@ -1,6 +1,7 @@
 """Shared fixtures of all tests: a router for each test, sessions, reference files, `--quick`."""
 
 import asyncio
+import gc
 import inspect
 import logging
 import sys
@@ -94,6 +95,17 @@ def shared() -> Path:
     return SHARED
 
 
+def pytest_collection_finish() -> None:
+    """Keep everything that is loaded out of garbage collections from here on.
+
+    Services collect, freeze and thaw all objects of their process. In a process with all test modules a
+    gateway's start would take 0.3 s for that.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.freeze = gc.unfreeze = lambda: None
+
+
 # ---------------------------------------------------- distribution to workers
 
 
@@ -121,6 +133,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 # Tests that `--quick` omits, in words, by marker or fixture; the first match counts.
 LEFT_OUT = {
+    "long": "belong to ./dev test --long",
     "browser": "drive the page in a browser",
     "processes": "start a whole site of processes",
     "slow": "start processes, or take more than a second",
@@ -189,6 +202,10 @@ def pytest_testnodedown(node: Any) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    reasons = Counter(
+        report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.getreports("skipped")
+    )
+    config.cache.set("robomesh/skipped", reasons)
     if config.getoption("--quick"):
         words = ", ".join(f"{count} that {LEFT_OUT[why]}" for why, count in _left_out.items())
         terminalreporter.write_line(f"--quick left out {_left_out.total()} tests: {words or 'none'}")

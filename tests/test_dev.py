@@ -105,6 +105,19 @@ def test_what_was_not_run_again_because_enough_failed_is_not_called_unsteady(jud
     assert named == []
 
 
+def test_skips_of_all_parts_are_counted_by_reason(tmp_path, capfd):
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = other\n")
+    (tmp_path / "conftest.py").write_text(
+        "from tests.conftest import pytest_addoption, pytest_terminal_summary\n"
+    )
+    skipped = "{mark}\n@pytest.mark.skip(reason='{why}')\ndef test_skipped_{number}():\n    pass\n"
+    rows = enumerate((("", "no curl"), ("@MARK", "no disk"), ("@MARK", "no curl")))
+    text = TESTS + "".join(skipped.format(mark=mark, why=why, number=number) for number, (mark, why) in rows)
+    (tmp_path / "test_it.py").write_text(text)
+    assert run_parts(PYTEST, PARTS, tmp_path) is None
+    assert capfd.readouterr().err == "dev: 2 skipped: no curl\ndev: 1 skipped: no disk\n"
+
+
 def test_tests_that_cannot_be_collected_fail_the_run(judged):
     why, _ = judged("import nothing_of_that_name\n")
     assert why == "dev: the tests could not be run; see above"

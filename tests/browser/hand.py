@@ -2,7 +2,7 @@
 
 from playwright.sync_api import Locator, Page
 
-KINDS = ("mouse", "touch", "pen")
+MOUSE, TOUCH, PEN = "mouse", "touch", "pen"
 MAIN, SECOND = 1, 2  # bits of buttons
 # Scripts that interrupt a hand; UNCOVER removes both. COVER takes the box of a button.
 SHOW_DIALOG = "document.body.appendChild(document.createElement('dialog')).showModal()"
@@ -27,7 +27,7 @@ class Hand:
 
     def press(self, x: float, y: float) -> None:
         self._at = x, y
-        if self._kind == "touch":
+        if self._kind == TOUCH:
             self._buttons = MAIN
             self._touch("touchStart")
         else:
@@ -38,10 +38,10 @@ class Hand:
 
     def move(self, x: float, y: float) -> None:
         self._at = x, y
-        self._touch("touchMove") if self._kind == "touch" else self._mouse("mouseMoved")
+        self._touch("touchMove") if self._kind == TOUCH else self._mouse("mouseMoved")
 
     def lift(self) -> None:
-        if self._kind == "touch":
+        if self._kind == TOUCH:
             self._end_touch("touchEnd")
         else:
             for button, bit in (("right", SECOND), ("left", MAIN)):
@@ -51,7 +51,7 @@ class Hand:
 
     def press_another(self, x: float, y: float) -> None:
         """Add a second finger, or press the second button."""
-        if self._kind == "touch":
+        if self._kind == TOUCH:
             self._touch("touchStart", (x, y))
         else:
             self._buttons |= SECOND

@@ -101,6 +101,7 @@ def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
     button(bob, "Release").click()
 
 
+@pytest.mark.long
 def test_a_question_stays_while_it_is_not_known_who_is_in_control(open_arm):
     alice, bob = open_arm(), open_arm()
     answers_come = answers_of(bob)
@@ -119,6 +120,7 @@ def test_a_question_stays_while_it_is_not_known_who_is_in_control(open_arm):
     expect(button(bob, "Take over…")).to_be_focused()
 
 
+@pytest.mark.long
 def test_a_running_motion_is_not_handed_over_but_stopped_by_a_take_over(open_arm):
     alice, bob = open_arm(), open_arm()
     ready(alice, "alice")
@@ -164,6 +166,7 @@ def test_the_same_name_in_two_windows_is_in_control_in_one(open_arm):
     button(second, "Release").click()
 
 
+@pytest.mark.long
 def test_a_key_that_is_held_down_is_one_step(open_arm, plant):
     page = open_arm()
     ready(page)
@@ -177,6 +180,7 @@ def test_a_key_that_is_held_down_is_one_step(open_arm, plant):
     assert audited(plant, "MOVE_RELATIVE") == moves + 1
 
 
+@pytest.mark.long
 def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_arm):
     page = open_arm()
     ready(page)

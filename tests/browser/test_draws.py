@@ -44,6 +44,7 @@ def expect_drawn_after(place, do):
     expect(place).not_to_have_attribute("data-drawn", str(before))
 
 
+@pytest.mark.long
 def test_a_robot_at_rest_is_not_drawn_again(open_page, plant):
     # A plot of 10 s is level after 10 s of rest.
     page = open_page(f"{ARM}?plot=10,joints")
@@ -71,6 +72,7 @@ def test_a_moving_robot_is_drawn_all_the_time(open_page):
             expect_drawn_after(place, lambda: None)
 
 
+@pytest.mark.long
 def test_a_coarse_picture_is_drawn_in_full_once_nothing_moves(open_page):
     page = open_page(ARM)
     canvas = scene(page)

@@ -70,6 +70,7 @@ def intranet():
         server.server_close()
 
 
+@pytest.mark.long
 def test_pages_of_listed_origins_show_pictures_and_video_and_others_do_not(mesh, page, intranet):  # noqa: F811
     (listed, other), pages = intranet
 
@@ -141,6 +142,7 @@ def test_a_listed_page_frames_one_view_without_controls_and_nothing_else(mesh, i
     run(main(), timeout_s=180.0)
 
 
+@pytest.mark.long
 def test_with_accounts_another_site_needs_a_token_although_the_browser_is_signed_in(mesh, intranet, tmp_path):
     (listed, _), pages = intranet
     other_site = listed.replace("127.0.0.1", "localhost")  # ports are no part of a site

@@ -34,6 +34,7 @@ def line(page, text):
     return alarms(page).filter(has_text=text)
 
 
+@pytest.mark.long
 def test_the_badge_of_a_silent_watch_does_not_say_that_there_are_no_alarms(open_page, plant):
     async def publish_once():
         publisher = plant.session.declare_publisher("yard", WHOLE_SITE, "alarms")
@@ -142,6 +143,7 @@ def test_the_audit_of_every_robot_is_there_and_its_logs_are_searched_when_asked(
     expect(original).to_have_attribute("lang", "en")
 
 
+@pytest.mark.long
 def test_alarms_and_events_have_their_reason_in_chinese(open_page, raised):
     page = open_page(EVENTS, drawn=False)
     button(page, "中文").click()
@@ -166,6 +168,7 @@ def test_alarms_and_events_have_their_reason_in_chinese(open_page, raised):
     expect(ended.first).to_contain_text("zhao 的控制权已结束。")
 
 
+@pytest.mark.long
 def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, raised):
     """Show texts of another program with "Trojan Source" characters (CVE-2021-42574) and Hebrew."""
     page = open_page(EVENTS, drawn=False)
@@ -182,6 +185,7 @@ def test_texts_of_others_change_the_order_of_nothing_beside_them(open_page, rais
     expect(isolated(hebrew)).to_have_text("stopped by \u05d4\u05d6\u05e8\u05d5\u05e2 3 at 10:15")
 
 
+@pytest.mark.long
 def test_settings_shows_a_service_that_is_gone(open_page, plant, raised):
     async def appear():
         token = plant.session.declare_presence_of("hall", WHOLE_SITE, "renderer", "r1")

@@ -8,7 +8,7 @@ from tests.browser.firefox import running_firefox
 from tests.browser.rendering import rendering
 from tests.site import wait_until
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.long, pytest.mark.browser]
 
 PROGRAM = shutil.which("firefox-esr") or shutil.which("firefox") or ""
 PAGES = {

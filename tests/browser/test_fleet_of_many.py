@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 from tests.browser.crowd import crowd
 from tests.browser.robot_page import button, drawings, joint_value, region, serious, tile, tiles, until, visit
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.long, pytest.mark.browser]
 
 COUNT = 200
 FIRST, LAST = "yard/r000", f"yard/r{COUNT - 1:03d}"

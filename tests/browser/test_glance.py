@@ -92,6 +92,7 @@ def test_the_first_screen_at_200_percent_shows_the_robot(open_page):
     assert bottom_of(joint_value(page, "shoulder")) <= stop["y"]
 
 
+@pytest.mark.long
 def test_every_page_has_the_same_bar(open_page):
     page = open_page(drawn=False, refused=True)
     bars = []
@@ -133,6 +134,7 @@ def test_the_bar_leads_to_another_robot_by_a_few_letters(open_page):
     expect(page).to_have_url(re.compile("#/program/hall/pt600$"))
 
 
+@pytest.mark.long
 def test_a_robot_that_does_not_exist_is_said_at_once_without_any_control_before(open_page):
     page = open_page(drawn=False)
     expect(tiles(page).first).to_be_visible()
@@ -153,6 +155,7 @@ def test_a_robot_that_does_not_exist_is_said_at_once_without_any_control_before(
     expect(region(page, "Control")).to_be_visible()
 
 
+@pytest.mark.long
 def test_the_last_still_is_shown_until_the_3_d_view_can_draw_and_looks_neither_live_nor_stale(
     open_page, plant, tmp_path
 ):

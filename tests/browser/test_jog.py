@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hand import COVER, KINDS, SHOW_DIALOG, UNCOVER, Hand, centre_of
+from tests.browser.hand import COVER, MOUSE, PEN, SHOW_DIALOG, TOUCH, UNCOVER, Hand, centre_of
 from tests.browser.robot_page import (
     ARM,
     audited,
@@ -47,7 +47,7 @@ def entries(plant):
     return [each for each in jogs if each.outcome != each.REFUSED]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [MOUSE, TOUCH, pytest.param(PEN, marks=pytest.mark.long)])
 def test_each_end_of_a_hold_ends_the_jog_and_says_why(jog_page, plant, kind):
     page, hand = jog_page, Hand(jog_page, kind)
     panel = region(page, "Tool")
@@ -103,7 +103,7 @@ def test_each_end_of_a_hold_ends_the_jog_and_says_why(jog_page, plant, kind):
     ends("another window", lambda *_: lose_focus())
     ends("a dialog opened", lambda *_: page.evaluate(SHOW_DIALOG))
     ends("the button was covered", lambda x, y, place: page.evaluate(COVER, place))
-    if kind == "touch":
+    if kind == TOUCH:
         ends("the browser took the pointer", lambda *_: hand.cancel())
     jogs = sum("Ended" in text for text in texts)
     # The list of the log may be older than the answer to the page.
@@ -150,7 +150,7 @@ def test_a_touch_that_scrolls_or_only_taps_moves_nothing(open_page, plant):
     button(panel, "Jog").click()
     plus = button(panel, "Tool Z +")
     before = audited(plant, "JOG")
-    for kind in ("touch", "pen"):
+    for kind in (TOUCH, PEN):
         hand = Hand(page, kind)
         plus.evaluate("each => each.scrollIntoView({block: 'center'})")
         page.wait_for_timeout(600)  # a control that has just moved ignores presses
@@ -161,7 +161,7 @@ def test_a_touch_that_scrolls_or_only_taps_moves_nothing(open_page, plant):
             hand.move(x, y - moved)
         page.wait_for_timeout(300)
         hand.lift()
-        if kind == "touch":
+        if kind == TOUCH:
             wait_until(lambda at=from_: page.evaluate("scrollY") > at + 50)
         plus.evaluate("each => each.scrollIntoView({block: 'center'})")
         page.wait_for_timeout(600)
@@ -176,7 +176,7 @@ def test_a_touch_that_scrolls_or_only_taps_moves_nothing(open_page, plant):
 def test_a_hidden_page_ends_the_jog_and_control(jog_page):
     panel = region(jog_page, "Tool")
     minus = button(panel, "Base Z −")
-    hand = Hand(jog_page, "mouse")
+    hand = Hand(jog_page, MOUSE)
     hand.press(*centre_of(minus))
     expect(panel.get_by_label("Outcome", exact=True)).to_contain_text(re.compile("Z −: [0-9]|Ended"))
     jog_page.evaluate(HIDE, True)

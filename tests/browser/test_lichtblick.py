@@ -30,7 +30,7 @@ from tests.compatibility.earlier import unpack
 from tests.ports import free_port
 from tests.site import running_site, wait_until
 
-pytestmark = [pytest.mark.browser, pytest.mark.processes]
+pytestmark = [pytest.mark.long, pytest.mark.browser, pytest.mark.processes]
 
 BUILD = Path(__file__).parents[3] / "shared" / "lichtblick" / "lichtblick-1.28.1-web.tar.xz"
 ARM = """

@@ -29,6 +29,7 @@ CAN = (
 )
 
 
+@pytest.mark.long
 def test_how_the_link_does_is_told_in_figures_and_what_its_driver_can_do_in_words(open_page):
     page = open_page(ARM, drawn=False)
     button(page, "Link").click()
@@ -41,6 +42,7 @@ def test_how_the_link_does_is_told_in_figures_and_what_its_driver_can_do_in_word
     assert serious(page) == []
 
 
+@pytest.mark.long
 def test_old_clients_are_counted_where_they_may_attach(open_page, plant):
     page = open_page(PT600, drawn=False)
     button(page, "Link").click()
@@ -75,6 +77,7 @@ def test_signals_are_shown_in_groups_and_never_look_live_when_they_are_stale(ope
     assert serious(page) == []
 
 
+@pytest.mark.long
 def test_a_flooding_controller_is_told_in_words(open_page, plant):
     page = open_page(PT600, drawn=False)
     expect(state_word(page)).to_have_text(re.compile("Idle|Moving"))
@@ -88,6 +91,7 @@ def test_a_flooding_controller_is_told_in_words(open_page, plant):
     expect(page.get_by_role("main").get_by_text("flooded")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_a_flood_of_refusals_is_shown_with_its_count(open_page, plant):
     page = open_page(ARM, drawn=False)
     button(page, "Requests").click()

@@ -27,7 +27,10 @@ from tests.browser.robot_page import (
 pytestmark = pytest.mark.browser
 
 ROBOTS = ("arm",)
-SIZES = [(1440, 900), (1024, 768), (360, 740)]
+SIZES = [
+    pytest.param(size, marks=[pytest.mark.long] * (size == (1024, 768)), id="{}x{}".format(*size))
+    for size in ((1440, 900), (1024, 768), (360, 740))
+]
 # Left, top, width and height of every control that moves the robot, in the document.
 PLACES = """() => Object.fromEntries([...document.querySelectorAll("[data-moves='true']")].map((each) => {
     const box = each.getBoundingClientRect();
@@ -41,7 +44,7 @@ PLACES = """() => Object.fromEntries([...document.querySelectorAll("[data-moves=
 }))"""
 
 
-@pytest.fixture(params=SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.fixture(params=SIZES)
 def page(request, open_page):
     """Yield a page of the arm, in control of it."""
     width, height = request.param
@@ -114,9 +117,9 @@ def test_a_press_on_a_control_that_has_just_moved_is_ignored(page):
     expect(waist).not_to_have_text(at_rest)
 
 
-@pytest.mark.parametrize(("width", "height"), SIZES)
-def test_an_alarm_moves_no_control(open_page, raised, width, height):
-    page = open_page(ARM, width, height, drawn=False)
+@pytest.mark.parametrize("size", SIZES)
+def test_an_alarm_moves_no_control(open_page, raised, size):
+    page = open_page(ARM, *size, drawn=False)
     expect(joint_values(page)).to_have_count(5)
     raised("kinematics.stop", "the arm is at the fence", severity=Event.CRITICAL)
     band = alarm_band(page)

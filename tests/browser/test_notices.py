@@ -35,6 +35,7 @@ def speed_hint(page):
     return region(page, "Control").get_by_role("status").filter(has_text=re.compile("^Low"))
 
 
+@pytest.mark.long
 def test_everybody_sees_the_speed_that_was_set_and_a_low_one_stands_out(open_page):
     alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     ready(alice, "alice")
@@ -63,6 +64,7 @@ def test_a_window_that_is_closed_has_not_given_control_back(open_page):
     button(bob, "Release").click()
 
 
+@pytest.mark.long
 def test_a_browser_that_is_seen_to_be_slow_keeps_control_and_is_told_when_it_is_too_slow(open_page):
     page, other = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
     answers_come = answers_of(page)

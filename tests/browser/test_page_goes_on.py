@@ -116,6 +116,7 @@ def test_an_old_press_of_stop_is_offered_when_the_connection_returns(open_page, 
     clear_stop(page)
 
 
+@pytest.mark.long
 def test_a_page_whose_part_is_no_longer_there_says_so(open_page):
     page = open_page(drawn=False)
     expect(tiles(page)).not_to_have_count(0)
@@ -127,6 +128,7 @@ def test_a_page_whose_part_is_no_longer_there_says_so(open_page):
     expect(page.get_by_role("article").first).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_link_to_what_no_robot_can_be_called_is_said_and_costs_no_connection(open_page):
     page = open_page(drawn=False)
     page.add_init_script(WORLD)

@@ -239,6 +239,7 @@ def test_a_recording_is_listed_and_played_and_a_seek_moves_arm_curves_and_clock(
     expect(button(transport(page), "Play")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_moment_without_joints_is_told_and_no_other_is_shown_as_this_one(open_page, recorded):
     page = open_page(f"#/recordings/hall/{QUARTER}", drawn=False)
     expect(play_button(page)).to_be_visible()
@@ -294,6 +295,7 @@ def test_a_recording_is_begun_and_ended_on_the_robots_page(open_page, recorded):
     expect(page.get_by_role("heading", level=1)).to_have_text("from-the-page")
 
 
+@pytest.mark.long
 def test_what_cannot_be_played_is_said(open_page, recorded):
     page = open_page("#/recordings/hall/gone.mcap", drawn=False)
     expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("no recording 'gone.mcap' here")
@@ -301,6 +303,7 @@ def test_what_cannot_be_played_is_said(open_page, recorded):
     expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("No player answers at nowhere")
 
 
+@pytest.mark.long
 def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_page, recorded):
     page = open_page("#/recordings", width=360, height=740, drawn=False)
     expect(recordings(page).first).to_be_visible()
@@ -318,6 +321,7 @@ def test_the_list_and_the_player_fit_a_phone_and_axe_finds_nothing_serious(open_
     keep_picture(page, "player")
 
 
+@pytest.mark.long
 def test_the_steps_of_a_run_are_folded_under_it(open_page, recorded):
     page = open_page(f"#/recordings/hall/{RUNS}", drawn=False)
     rows = events(page)
@@ -386,6 +390,7 @@ def test_a_note_of_one_page_is_seen_and_withdrawn_on_another(noted, plant, open_
     keep_picture(other, "day")
 
 
+@pytest.mark.long
 def test_a_note_on_a_recording_is_beside_it_and_its_file_is_unchanged(noted, recorded, plant, open_page):
     before = plant.call(ask_info(plant, recorded))
     page = open_page(f"#/recordings/hall/{recorded}")

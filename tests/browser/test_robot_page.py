@@ -97,6 +97,7 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
     assert audited(plant, "MOVE_ABSOLUTE") == moves
 
 
+@pytest.mark.long
 def test_a_target_that_homing_left_behind_moves_no_joint_that_nobody_touched(open_page, plant):
     page = open_page(ARM, drawn=False)
     ready(page)
@@ -131,6 +132,7 @@ def test_stop_works_without_control_and_names_who_asked(open_page):
     expect(page.get_by_role("button", name="Reset stop")).to_be_disabled()
 
 
+@pytest.mark.long
 def test_the_choice_of_a_program_says_where_it_is_and_its_stop_names_the_whole_fleet(open_page):
     page = open_page("#/program", drawn=False)
     crumbs = page.get_by_role("navigation", name="Robot of this page")
@@ -209,6 +211,7 @@ def test_a_phone_shows_one_column_with_stop_under_the_thumb(open_page):
         assert small == []
 
 
+@pytest.mark.long
 def test_a_control_room_sees_everything_of_a_robot_without_scrolling(open_page):
     page = open_page("#/hall/pt600", drawn=False)
     expect(joint_value(page, "waist")).to_be_visible()
@@ -222,6 +225,7 @@ def test_a_control_room_sees_everything_of_a_robot_without_scrolling(open_page):
         assert box["height"] >= 80, name
 
 
+@pytest.mark.long
 def test_the_video_can_have_the_large_place_and_stop_stays_where_it_is(open_page):
     page = open_page(ARM, drawn=False)
     stop = stop_button(page).bounding_box()

@@ -128,6 +128,7 @@ def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_t
     wait_until(lambda: "zhao.hall" in asked_by(plant, "STOP"), what="the audit log does not name zhao.hall")
 
 
+@pytest.mark.long
 def test_who_becomes_a_monitor_is_told_so_and_so_is_everybody_else(open_tab, accounts):
     page = open_tab()
     sign_in(page, "li")
@@ -140,6 +141,7 @@ def test_who_becomes_a_monitor_is_told_so_and_so_is_everybody_else(open_tab, acc
     change_account(accounts, "role", "li", role=AccountRole.OPERATOR)
 
 
+@pytest.mark.long
 def test_a_password_is_changed_with_progress_and_a_wrong_one_is_named(open_tab):
     page = open_tab()
     sign_in(page, "li")
@@ -167,6 +169,7 @@ def test_a_password_is_changed_with_progress_and_a_wrong_one_is_named(open_tab):
     expect(sheet).to_be_visible()
 
 
+@pytest.mark.long
 def test_the_right_to_command_that_rests_is_given_back_for_the_password(open_tab, monkeypatch):
     page = open_tab()
     sign_in(page, "chen")

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hand import KINDS, Hand, centre_of
+from tests.browser.hand import MOUSE, PEN, TOUCH, Hand, centre_of
 from tests.browser.robot_page import (
     ARM,
     audited,
@@ -59,7 +59,9 @@ def arrives(page, end):
     expect(state_word(page)).to_have_text("Idle")
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [MOUSE, *(pytest.param(each, marks=pytest.mark.long) for each in (TOUCH, PEN))]
+)
 def test_twenty_quick_taps_turn_the_arm_by_the_taps_that_were_taken(steps_page, plant, kind):
     page, hand = steps_page, Hand(steps_page, kind)
     button(region(page, "Joints"), "5").click()

@@ -11,7 +11,7 @@ from services.site_file.tables.fixtures import Fixture as FixtureRow
 from services.site_file.tables.fixtures import fixture_shape, fixture_to_site
 from tests.browser.robot_page import ARM, audited, button, drag, joints_notice, ready
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.long, pytest.mark.browser]
 
 ROBOTS = ("arm",)
 # In the way of the wrist at 45 degrees of the waist.

@@ -110,6 +110,7 @@ def test_a_browser_without_a_decoder_shows_still_pictures_and_says_so(open_page,
     publisher.close()
 
 
+@pytest.mark.long
 def test_a_refused_video_is_explained(open_page, plant):
     publisher, encoder = publisher_of(plant, "video/front"), Encoder()
     message, key = encoder.frame(200, 30, 30)

@@ -62,12 +62,14 @@ def test_what_is_chosen_stands_in_the_address_and_keys_go_from_tile_to_tile(open
     expect(page.get_by_role("heading", level=1)).to_have_text("pt600")
 
 
+@pytest.mark.long
 def test_a_robot_that_there_is_not_is_said_so_and_a_picture_that_does_not_come_too(open_page):
     page = open_page("#/wall/hall/nobody/close/hall/arm/front", drawn=False)
     expect(page.get_by_role("article").nth(0)).to_contain_text("not on the mesh")
     expect(page.get_by_role("article").nth(1)).to_contain_text("Waiting for a picture")
 
 
+@pytest.mark.long
 def test_a_tile_gives_only_the_reason_of_its_state(open_page, plant):
     page = open_page("#/wall/hall/arm/close/hall/replay-gone/close", drawn=False)
     tile = page.get_by_role("article").nth(0)
@@ -84,6 +86,7 @@ def test_a_tile_gives_only_the_reason_of_its_state(open_page, plant):
     expect(state_word(page)).to_have_text("Idle")
 
 
+@pytest.mark.long
 def test_a_tile_asks_for_a_picture_of_its_size_which_moves_as_the_arm_does(open_page, rendered):
     page = open_page("#/wall/hall/pt600/close", width=400, height=700, drawn=False)
     expect(page.get_by_role("article").get_by_role("img")).to_have_attribute("data-drawn", "true")

@@ -243,6 +243,7 @@ def test_the_audit_log_names_the_picture_that_was_on_the_screen(open_page, plant
     button(page, "Release").click()
 
 
+@pytest.mark.long
 def test_the_picture_of_a_request_is_opened_from_a_recording(open_page, plant, video, recorded):
     page = open_page(ARM, drawn=False)
     with repeated(video.publish):

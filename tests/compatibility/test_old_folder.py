@@ -12,7 +12,7 @@ from tests.compatibility.earlier import PASSWORD, unpack
 from tests.ports import free_port
 from tests.site import lean, robomesh, running_file, wait_until
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.long, pytest.mark.processes]
 
 LATER = 4102444800.0  # 2100-01-01: the alarm stays shelved, whenever the test runs
 

@@ -14,7 +14,7 @@ from tests.ports import free_port
 from tests.services.test_console import browse
 from tests.site import RATE_HZ, robomesh, wait_until
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.long, pytest.mark.processes]
 
 SITE = """
 site = "plant"

@@ -16,7 +16,7 @@ from tests.check_platforms import PYTHONS
 from tests.ports import free_port
 from tests.site import ONE_ARM, running_file, running_site, site_file, wait_until
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.long, pytest.mark.processes]
 
 ROOT = Path(__file__).parents[2]
 UV = ROOT / ".tools" / "bin" / "uv"

@@ -103,6 +103,7 @@ def test_it_is_commanded_drawn_and_recorded_as_any_other(site, page, mine, tmp_p
     assert robomesh("audit", "verify", str(site.folder / "audit" / "test" / "mine.jsonl")).returncode == 0
 
 
+@pytest.mark.long
 def test_saving_a_started_robot_restarts_only_that_robot(site, page, mine):
     before = programs(site)
     mine["description"]["joint"][0]["limits"] = [-60, 60]
@@ -120,6 +121,7 @@ def test_saving_a_started_robot_restarts_only_that_robot(site, page, mine):
     assert "60.00" in refused.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["gateway mine", "simulate mine", "console"])
 def test_a_killed_process_is_restarted(site, page, mine, name):
     before = programs(site)
@@ -175,6 +177,7 @@ def test_taken_out_its_processes_end(site, page, mine):
     assert on_the_mesh(site)["arm"] == "up"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_it_is_there_at_the_next_up_and_nothing_is_left_after(site, page, mine, number, tmp_path):
     folder = tmp_path / "second"

@@ -399,6 +399,7 @@ def test_a_link_to_a_site_that_did_not_admit_us_is_refused_with_advice(site, con
         _ = load(site).links
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_doctor_tries_every_certificate_and_finds_deviations_of_a_router(site, capsys):
     keys("init", str(site))

@@ -143,6 +143,7 @@ def addresses(site) -> dict[str, str]:
     return {line[1]: line[2] for line in lines if line}
 
 
+@pytest.mark.long
 @pytest.mark.processes
 def test_dashboard_and_rules_ask_for_metrics_and_labels_that_the_services_have(site):
     labels: dict[str, set[str]] = {}
@@ -231,6 +232,7 @@ def colours(url: str, title: str) -> dict[str, str]:
     }
 
 
+@pytest.mark.long
 @needs_prometheus
 @pytest.mark.processes
 def test_a_dead_gateway_turns_its_panels_red_and_fires_an_alert(site, tmp_path):

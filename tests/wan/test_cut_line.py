@@ -10,7 +10,7 @@ from tests.site import wait_until
 from tests.wan.network import Link, Network, missing
 from tests.wan.sites import ARM, PORT, Probe, Site
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.long, pytest.mark.processes]
 
 JOINTS = "robomesh/plant/arm/joints"
 EVENTS = "robomesh/plant/arm/events"

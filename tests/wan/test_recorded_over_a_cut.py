@@ -12,7 +12,7 @@ from robomesh.schemas.robomesh_pb2 import Recording
 from tests.wan.network import Network, missing
 from tests.wan.sites import ARM, PORT, Probe, Site, stop
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.long, pytest.mark.processes]
 
 JOINTS = "robomesh/plant/arm/joints"
 EVENTS = "robomesh/plant/arm/events"

@@ -5,7 +5,7 @@ import pytest
 from tests.wan.network import Network, missing
 from tests.wan.sites import PORT, Probe, Site
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.long, pytest.mark.processes]
 
 VIDEO = "robomesh/plant/arm/video/free"
 MESH = "robomesh/plant/arm/mesh/base"

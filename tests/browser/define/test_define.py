@@ -126,6 +126,7 @@ def test_an_arm_of_dropped_files_gets_rows_and_limits_is_saved_started_and_moves
     expect(button(page, "Start simulated")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_the_arm_is_drawn_where_the_server_says_that_it_is(open_page):
     page = opened(open_page, "puma560")
     drawn, reported = tools(page)
@@ -145,6 +146,7 @@ def test_the_arm_is_drawn_where_the_server_says_that_it_is(open_page):
     assert np.linalg.norm(moved[:3, 3] - drawn[:3, 3]) > 0.05
 
 
+@pytest.mark.long
 def test_an_invalid_position_marks_only_its_own_field(open_page):
     page = opened(open_page, "pt500", drawn=False)
     page.get_by_label("Position of elbow").last.fill("x")
@@ -174,6 +176,7 @@ def test_a_wrong_limit_is_told_marked_and_found_again_by_a_click(open_page):
     expect(problems(page)).to_have_count(0)
 
 
+@pytest.mark.long
 def test_what_is_no_number_stays_marked_and_is_not_saved(open_page):
     page = opened(open_page, "pt500", drawn=False)
     cell = field(page, "joint/1/a")
@@ -220,6 +223,7 @@ def test_a_pasted_table_is_shown_as_it_is_read_fills_the_rows_and_is_undone(open
     expect(field(page, "joint/1/limits/1")).to_have_value("130")
 
 
+@pytest.mark.long
 def test_a_shape_in_the_wrong_unit_is_told(open_page):
     page = opened(open_page, "pt500", drawn=False)
     choose(page, 0)
@@ -227,6 +231,7 @@ def test_a_shape_in_the_wrong_unit_is_told(open_page):
     expect(checks(page)).to_contain_text("column.3ds is 242 m large: is the file’s unit right?")
 
 
+@pytest.mark.long
 def test_checks_go_on_when_the_console_is_there_again(open_page):
     page = opened(open_page, "pt500", drawn=False, refused=True)
     settled(page)
@@ -237,6 +242,7 @@ def test_checks_go_on_when_the_console_is_there_again(open_page):
     expect(checks(page)).to_contain_text("Nothing is wrong with it.")
 
 
+@pytest.mark.long
 def test_joints_are_reordered_by_dragging_and_removed_by_the_keyboard(open_page):
     page = opened(open_page, "pt500", drawn=False)
     names = chain_rows(page).get_by_role("strong")
@@ -313,6 +319,7 @@ def test_a_reload_keeps_unsaved_work_and_says_so_until_it_is_discarded(open_page
     expect(page.get_by_text("From link files")).to_be_visible()
 
 
+@pytest.mark.long
 def test_files_that_the_server_forgot_are_sent_again(open_page, plant):
     page = open_page("#/define", refused=True)
     drop(page, shape("base.wrl"), shape("wrist.wrl"))
@@ -329,6 +336,7 @@ def test_files_that_the_server_forgot_are_sent_again(open_page, plant):
     expect(canvas).to_have_attribute("data-shapes", "2")
 
 
+@pytest.mark.long
 def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
     page = open_page("#/define", drawn=False)
     outer = b'#VRML V2.0 utf8\nInline { url "part.wrl" }\nShape { geometry Box { } }\n'
@@ -341,6 +349,7 @@ def test_a_file_that_another_refers_to_is_asked_for_by_name(open_page):
     expect(chain_rows(page)).to_have_count(2)
 
 
+@pytest.mark.long
 def test_a_file_that_cannot_be_read_is_refused_by_name_and_the_others_are_taken(open_page):
     page = open_page("#/define", drawn=False, refused=True)
     drop(page, shape("base.wrl"), ("bad.3ds", b"MM\x00"))
@@ -391,6 +400,7 @@ def stl(triangles):
     return f"solid s\n{''.join(facets)}endsolid s\n".encode()
 
 
+@pytest.mark.long
 def test_a_urdf_and_files_of_one_name_are_read_in_one_drop_and_unused_ones_are_named(open_page):
     page = open_page("#/define")
     urdf = SAME_NAMES.format(base=shapes_of("base"), arm=shapes_of("arm")).encode()
@@ -405,6 +415,7 @@ def test_a_urdf_and_files_of_one_name_are_read_in_one_drop_and_unused_ones_are_n
     expect(page.get_by_role("main")).to_contain_text("31 triangles")
 
 
+@pytest.mark.long
 def test_found_and_missing_files_of_a_urdf_are_counted(open_page):
     page = open_page("#/define")
     urdf = SAME_NAMES.format(base=shapes_of("base"), arm=shapes_of("arm")).encode()
@@ -416,6 +427,7 @@ def test_found_and_missing_files_of_a_urdf_are_counted(open_page):
     expect(drawing(page)).to_have_attribute("data-shapes", "2")
 
 
+@pytest.mark.long
 def test_a_xacro_file_is_refused_with_what_to_do(open_page):
     page = open_page("#/define")
     drop(page, ("arm.urdf.xacro", b"<robot/>"), ("base.stl", stl(7)))
@@ -423,6 +435,7 @@ def test_a_xacro_file_is_refused_with_what_to_do(open_page):
     expect(chain_rows(page)).to_have_count(0)
 
 
+@pytest.mark.long
 def test_a_urdf_whose_first_axis_points_down_keeps_its_base_frame(open_page, plant):
     page = open_page("#/define")
     drop(page, ("down.urdf", KUKA_LIKE.encode()))
@@ -466,6 +479,7 @@ DEF ARM Humanoid { humanoidBody [ DEF ROOT Joint { jointType "fixed" children [
 """
 
 
+@pytest.mark.long
 def test_a_robot_of_openhrp_is_chosen_as_one(open_page, tmp_path):
     file = tmp_path / "arm.wrl"
     file.write_bytes(OPENHRP)
@@ -479,6 +493,7 @@ def test_a_robot_of_openhrp_is_chosen_as_one(open_page, tmp_path):
     assert limits == ["−85.943669", "85.943669"]
 
 
+@pytest.mark.long
 def test_saving_over_a_robot_is_asked_first(open_page, plant):
     page = open_page(drawn=False, refused=True)
     for title in ("First", "Second"):
@@ -498,6 +513,7 @@ def test_saving_over_a_robot_is_asked_first(open_page, plant):
     assert load(plant.robots / "twice").title == "Second"
 
 
+@pytest.mark.long
 def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
     page = opened(open_page, "pt500")
     with page.expect_download() as download:
@@ -517,6 +533,7 @@ def test_a_zip_holds_the_description_and_its_shapes(open_page, tmp_path):
     assert np.allclose(drawn, reported, atol=1e-9)
 
 
+@pytest.mark.long
 def test_ignored_pairs_frames_constraints_and_views_are_kept(open_page, plant):
     page = opened(open_page, "pt500")
     tab(page, "Frames")
@@ -563,6 +580,7 @@ TOUCHING = """<robot name="touching">
 </robot>"""
 
 
+@pytest.mark.long
 def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_page):
     page = open_page("#/define")
     drop(page, ("touching.urdf", TOUCHING.encode()))
@@ -598,6 +616,7 @@ def test_each_pair_of_links_shows_how_it_is_checked_or_why_it_is_ignored(open_pa
     expect(page.get_by_role("table", name="碰撞")).to_contain_text("两者仅隔一个关节")
 
 
+@pytest.mark.long
 def test_a_plan_of_pairs_that_failed_says_why_and_is_asked_for_again(open_page):
     page = opened(open_page, "pt500", drawn=False, refused=True)
     page.route(
@@ -615,6 +634,7 @@ def test_a_plan_of_pairs_that_failed_says_why_and_is_asked_for_again(open_page):
     )
 
 
+@pytest.mark.long
 def test_renaming_a_joint_and_a_link_leaves_nothing_that_names_the_old(open_page):
     page = opened(open_page, "pt500", drawn=False)
     tab(page, "Constraints")
@@ -633,6 +653,7 @@ def test_renaming_a_joint_and_a_link_leaves_nothing_that_names_the_old(open_page
     expect(field(page, "constraint/0/joints/lift")).to_have_value("1")
 
 
+@pytest.mark.long
 def test_a_robot_that_is_not_here_is_said(open_page):
     page = open_page("#/define/nobody", drawn=False, refused=True)
     expect(refusal(page)).to_contain_text("nobody cannot be opened: there is no robot")

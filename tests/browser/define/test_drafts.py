@@ -44,6 +44,7 @@ def save_new(page, name, title):
     expect(save_state(page)).to_have_text("Saved")
 
 
+@pytest.mark.long
 def test_a_file_that_is_read_late_is_not_put_into_the_robot_opened_meanwhile(open_page):
     page = opened(open_page, "pt500")
     expect(drawing(page)).to_have_attribute("data-shapes", "6")
@@ -60,6 +61,7 @@ def test_a_file_that_is_read_late_is_not_put_into_the_robot_opened_meanwhile(ope
     expect(save_state(page)).to_have_text("No changes")
 
 
+@pytest.mark.long
 def test_a_robot_that_is_answered_late_does_not_replace_the_one_opened_meanwhile(open_page):
     page = open_page("#/define", drawn=False)
     with held(page, "**/define/robots/pt500"):
@@ -71,6 +73,7 @@ def test_a_robot_that_is_answered_late_does_not_replace_the_one_opened_meanwhile
     expect(table_rows(page)).to_have_count(6)
 
 
+@pytest.mark.long
 def test_two_shapes_chosen_in_a_row_are_both_kept(open_page):
     page = open_page("#/define")
     button(page, "Start empty").click()
@@ -85,6 +88,7 @@ def test_two_shapes_chosen_in_a_row_are_both_kept(open_page):
     expect(drawing(page)).to_have_attribute("data-shapes", "2")
 
 
+@pytest.mark.long
 def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is(open_page, plant):
     page = open_page("#/define", drawn=False)
     button(page, "Start empty").click()
@@ -107,6 +111,7 @@ def test_a_save_that_is_answered_late_leaves_the_robot_opened_meanwhile_as_it_is
     expect(page.get_by_role("button", name=re.compile("^Continue "))).to_have_count(0)
 
 
+@pytest.mark.long
 def test_what_somebody_else_saved_meanwhile_is_asked_about_and_ones_own_is_not(open_page, plant):
     page = open_page("#/define", drawn=False, refused=True)
     save_new(page, "shared", "First")
@@ -154,6 +159,7 @@ def test_every_tab_has_a_new_draft_of_its_own_and_another_tab_offers_them_all(op
     expect(other.get_by_role("heading", level=1)).to_have_text("Arm 0")
 
 
+@pytest.mark.long
 def test_a_shape_that_cannot_be_read_is_among_the_problems(open_page, plant):
     folder = plant.robots / "broken"
     folder.mkdir(parents=True)
@@ -172,6 +178,7 @@ def test_a_shape_that_cannot_be_read_is_among_the_problems(open_page, plant):
     expect(problems(page)).to_have_count(1)
 
 
+@pytest.mark.long
 def test_files_of_which_nothing_can_be_made_are_said(open_page):
     page = open_page("#/define", drawn=False, refused=True)
     drop(page, ("notes.txt", b"none"))

@@ -51,6 +51,7 @@ def test_a_phone_shows_one_column_that_scrolls_one_way(open_page):
     assert small(page) == []
 
 
+@pytest.mark.long
 def test_on_a_desk_only_lists_scroll(open_page):
     page = opened(open_page, "puma560", drawn=False)
     settled(page)
@@ -63,6 +64,7 @@ def test_on_a_desk_only_lists_scroll(open_page):
         assert size == [width, height, height]
 
 
+@pytest.mark.long
 def test_axe_finds_nothing_serious_in_define(open_page):
     page = open_page("#/define", drawn=False)
     expect(robots(page).first).to_be_attached()
@@ -82,6 +84,7 @@ def test_axe_finds_nothing_serious_in_define(open_page):
     assert found == {place: [] for place in found}
 
 
+@pytest.mark.long
 def test_define_speaks_chinese(open_page):
     page = opened(open_page, "pt500", drawn=False)
     button(page, "中文").click()

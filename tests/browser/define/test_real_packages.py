@@ -5,7 +5,7 @@ from playwright.sync_api import expect
 
 from tests.browser.define.page import drawing, drop
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.long, pytest.mark.browser]
 
 
 @pytest.mark.parametrize(

@@ -72,6 +72,7 @@ def test_a_program_that_is_typed_is_checked_and_its_motion_is_shown_as_a_ghost(o
     expect(run_button(page)).to_be_disabled()
 
 
+@pytest.mark.long
 def test_a_program_that_collides_leads_to_its_line_and_the_gateway_refuses_it_and_nothing_moves(
     open_page, plant
 ):
@@ -177,6 +178,7 @@ def test_points_are_taught_named_shown_and_taken_back(open_page):
     expect(button(page, "Rename part")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_phone_shows_programs_in_one_column_and_axe_finds_nothing_serious(open_page):
     page = open_page("#/program", width=360, height=740, has_touch=True, drawn=False)
     robot = page.get_by_role("main").get_by_role("link")
@@ -194,6 +196,7 @@ def test_a_phone_shows_programs_in_one_column_and_axe_finds_nothing_serious(open
         assert serious(page) == []
 
 
+@pytest.mark.long
 def test_on_a_desk_only_lists_of_a_program_scroll_and_axe_finds_nothing_serious(open_page):
     page = open_page(PAGE, drawn=False)
     write(page, COLLIDES)

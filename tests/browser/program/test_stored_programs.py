@@ -80,6 +80,7 @@ def test_a_program_that_one_page_saves_is_opened_changed_and_restored_by_another
     line(page, "restored as version 6")
 
 
+@pytest.mark.long
 def test_two_people_who_save_at_the_same_time_lose_nothing_and_the_second_decides(open_page):
     page, other = open_page(PAGE, drawn=False), open_page(PAGE, drawn=False)
     write(page, "home\n")
@@ -101,6 +102,7 @@ def test_two_people_who_save_at_the_same_time_lose_nothing_and_the_second_decide
     line(page, "saved version 4")
 
 
+@pytest.mark.long
 def test_a_draft_that_was_never_saved_and_one_with_changes_outlive_a_reload_and_are_not_lost_by_opening(
     open_page,
 ):
@@ -130,6 +132,7 @@ def test_a_draft_that_was_never_saved_and_one_with_changes_outlive_a_reload_and_
     line(page, "Saved: version 2")
 
 
+@pytest.mark.long
 def test_files_are_imported_as_programs_and_a_version_is_exported_byte_for_byte(open_page, tmp_path):
     page = open_page(PAGE, drawn=False)
     button(page, "Programs").click()
@@ -147,6 +150,7 @@ def test_files_are_imported_as_programs_and_a_version_is_exported_byte_for_byte(
     assert (tmp_path / "out").read_bytes() == "home # ü\n".encode()
 
 
+@pytest.mark.long
 def test_an_audit_entry_opens_the_text_that_ran_although_it_was_never_saved(open_page):
     page = open_page(PAGE, drawn=False)
     write(page, WAITS)
@@ -167,6 +171,7 @@ def test_an_audit_entry_opens_the_text_that_ran_although_it_was_never_saved(open
     expect(text_of(page)).to_have_value(WAITS)
 
 
+@pytest.mark.long
 def test_a_phone_shows_stored_programs_and_axe_finds_nothing_serious(open_page):
     page = open_page(PAGE, width=360, height=740, has_touch=True, drawn=False)
     write(page, "home\n")
