@@ -205,7 +205,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     reasons = Counter(
         report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.getreports("skipped")
     )
-    config.cache.set("robomesh/skipped", reasons)
+    if (cache := getattr(config, "cache", None)) is not None:  # `-p no:cacheprovider` removes it
+        cache.set("robomesh/skipped", reasons)
     if config.getoption("--quick"):
         words = ", ".join(f"{count} that {LEFT_OUT[why]}" for why, count in _left_out.items())
         terminalreporter.write_line(f"--quick left out {_left_out.total()} tests: {words or 'none'}")
