@@ -1,9 +1,10 @@
-"""Runs on other Pythons and systems: `./dev test --long [PART ...]`. CONTRIBUTING.md has their table.
+"""Runs that take longer than CI: `./dev test --long [PART ...]`. CONTRIBUTING.md has their table.
 
 Each part clones this commit into a new folder, here or in a bare Debian, and sets it up as the README says.
-Its log and its result stay in `.long`. It needs root and mmdebstrap, for the Debians.
+Its log and its result stay in `.long`. A part that cannot run here stops no other.
 """
 
+import contextlib
 import json
 import os
 import re
@@ -13,6 +14,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,14 +23,29 @@ ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / ".long"
 LONGEST_S = 3600.0
 _SUITE, _QUICK = "./dev test", "./dev test --quick"
-_COMMANDS = ".venv/bin/python -m tests.long.documented_commands"
-_WITHOUT = ".venv/bin/python -m tests.long.without"
+_PYTHON = ".venv/bin/python"
+_COMMANDS = f"{_PYTHON} -m tests.long.documented_commands"
+_SET_UP = f"./dev test --version && {_PYTHON} -V"
+_READY = "long: set up"
+# What the page's tests and those of whole sites need.
+_BUSY = "./dev test -n auto --maxprocesses 4 --dist loadfile"
 _BARE = "python3,python3-pip,git,ca-certificates"
 # What the README names, and a user without rights cannot install.
 _PACKAGES = "chromium fonts-noto-cjk libatomic1 libegl1 libgl1 libgomp1"
 # Of the machine's network, for installers.
 _NETWORK = ("etc/resolv.conf", "etc/hosts", "etc/pip.conf", "etc/ssl/certs", "root/.npmrc")
 _OF_INSTALLERS = re.compile(r"^(PIP|UV|SSL|NODE|npm|CURL|REQUESTS|GIT_SSL)_|_(PROXY|proxy)$")
+# Of a run of pytest, of the documents' commands, and of a part's own lines.
+_COUNTS = re.compile(
+    r"\d+ (?:passed|failed).*?(?= in \d)|\d+ of the documents' commands.*|(?<=^long: )(?!set up).*", re.M
+)
+_SKIPS = re.compile(r"^SKIPPED \[(\d+)\] \S+ (.*)", re.M)
+
+SEED = os.environ.get("ROBOMESH_SEED") or str(int(time.time()))
+_FUZZERS = sorted(
+    ".".join(each.relative_to(ROOT).with_suffix("").parts) for each in ROOT.glob("tests/**/fuzz_*.py")
+)
+_ENDLESS = f"--inputs 1000000000 --seconds {2400 // len(_FUZZERS)} --seed {SEED} --keep findings"
 
 
 @dataclass(frozen=True)
@@ -42,6 +60,7 @@ class Part:
         folder: Where the clone is, in the Debian.
         environment: Variables.
         read_only_home: The user's home cannot be written.
+        set_up: Command that is typed first, on this machine; where it fails, the part cannot run.
     """
 
     runs: tuple[str, ...]
@@ -51,6 +70,7 @@ class Part:
     folder: str = "/srv/robomesh"
     environment: dict[str, str] = field(default_factory=dict)
     read_only_home: bool = False
+    set_up: str = _SET_UP
 
 
 PARTS = {
@@ -64,11 +84,35 @@ PARTS = {
     ),
     "python-3.12": Part((_QUICK,), python="3.12"),
     "python-3.13": Part((_QUICK,), python="3.13"),
-    "without-kinds": Part((f"./dev run pytest --version && {_WITHOUT}",)),
     "python-3.14": Part((_QUICK, _COMMANDS), debian="testing"),
     "first-hour": Part(
         (f"./dev run true && {_COMMANDS}",), debian="bookworm", user="newcomer", read_only_home=True
     ),
+    "page": Part((f"{_BUSY} tests/browser",)),
+    "rest": Part((f'{_BUSY} -m "not browser"',)),
+    "compatibility": Part(("./dev test tests/compatibility",)),
+    "elsewhere": Part((f"{_PYTHON} -m tests.long.elsewhere",)),
+    "fuzzing": Part(
+        (
+            f"echo long: seed {SEED}",
+            f"{_PYTHON} -m tests.fuzz.hulls_and_triangles --seed {SEED}",
+            *(f"{_PYTHON} -m {each} {_ENDLESS}" for each in _FUZZERS),
+        )
+    ),
+    "soak": Part(
+        (
+            f"echo long: seed {SEED}",
+            f"{_PYTHON} -m tests.soak.audit_kills --times 25 --seed {SEED}",
+            f"{_PYTHON} -m tests.soak.latch_kills --times 15",
+            f"{_PYTHON} -m tests.soak.recorder_kills --times 25 --seed {SEED}",
+            f"{_PYTHON} -m tests.soak.recorder_disk",
+            f"{_PYTHON} -m tests.soak.verify_joints --rest 20",
+        )
+    ),
+    **{
+        f"without-{kind.replace('_', '-')}": Part((f"{_PYTHON} -m tests.long.without {kind}",))
+        for kind in ("fanuc", "opcua", "universal_robots", "yaskawa")
+    },
 }
 
 
@@ -76,22 +120,21 @@ def main(names: list[str]) -> None:
     """Run parts, each one that is named, or all, and print every result that is kept."""
     if unknown := [name for name in names if name not in PARTS]:
         sys.exit(f"dev: there is no part {unknown[0]!r}: {', '.join(PARTS)} are there")
-    wanted = names or list(PARTS)
-    debians = [name for name in wanted if PARTS[name].debian]
-    if debians and (os.geteuid() != 0 or shutil.which("mmdebstrap") is None):
-        sys.exit(f"dev: {debians[0]} needs root and mmdebstrap: apt-get install mmdebstrap")
     RESULTS.mkdir(exist_ok=True)
     # A shell's background ignores Ctrl-C, and so would every command of a part.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    wanted = names or list(PARTS)
     for name in wanted:
         result = run(name, PARTS[name])
         (RESULTS / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     kept = {name: RESULTS / f"{name}.json" for name in PARTS}
-    results = {name: json.loads(file.read_text()) for name, file in kept.items() if file.exists()}
+    results = {name: json.loads(file.read_text("utf-8")) for name, file in kept.items() if file.exists()}
     for name, each in results.items():
-        counts = "; ".join(each["counts"])
-        print(f"{name:12} {each['outcome']:9} {each['python']:8} {each['minutes']:4.0f} min  {counts}")
-    sys.exit(any(results[name]["outcome"] != "passed" for name in wanted))
+        said = each.get("reason") or "; ".join(each["counts"])
+        print(f"{name:24} {each['outcome']:9} {each['python']:8} {each['minutes']:4.0f} min  {said}")
+    sys.stdout.flush()
+    idle = [f"dev: {name} not run: {results[name]['reason']}" for name in wanted if results[name]["reason"]]
+    sys.exit("\n".join(idle) or any(results[name]["outcome"] != "passed" for name in wanted))
 
 
 def run(name: str, part: Part) -> dict[str, object]:
@@ -104,34 +147,69 @@ def run(name: str, part: Part) -> dict[str, object]:
     )
     print(f"dev: {name}: its log is {log.relative_to(ROOT)}", file=sys.stderr, flush=True)
     began_s = time.monotonic()
-    with log.open("w", encoding="utf-8") as output:
-        command = in_debian(folder, part) if part.debian else on_this_machine(folder, part)
-        try:
-            # What it starts ends with it, and its mounts too.
-            separate = ("unshare", "--mount", "--pid", "--fork", "--kill-child") if part.debian else ()
-            done = subprocess.run(
-                [*separate, "sh", "-euc", command],
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                stdin=subprocess.DEVNULL,
-                timeout=LONGEST_S,
-                check=False,
-            )
-            outcome = "passed" if done.returncode == 0 else "failed"
-        except subprocess.TimeoutExpired:
-            outcome = "too long"
+    if missing := lacks(part):
+        outcome = "not run"
+        log.write_text(missing, encoding="utf-8")
+    else:
+        outcome = execute(folder, log, part)
     said = log.read_text(encoding="utf-8", errors="replace")
-    if outcome == "passed":
+    if outcome in ("passed", "not run"):
         remove(folder)
-    version = re.findall(r"^platform linux -- Python (\S+),|^python (\S+)$", said, re.M)
+    version = re.findall(r"^platform linux -- Python (\S+),|^[Pp]ython (\S+)$", said, re.M)
+    skips: Counter[str] = Counter()
+    for count, why in _SKIPS.findall(said):
+        skips[why] += int(count)
     return {
         "outcome": outcome,
+        "reason": problem(said) if outcome == "not run" else "",
         "commit": commit.stdout.strip(),
         "python": "".join(version[0]) if version else "",
         "minutes": (time.monotonic() - began_s) / 60,
-        # Of each run of pytest, and of the documents' commands.
-        "counts": re.findall(r"\d+ (?:passed|failed).*?(?= in \d)|\d+ of the documents' commands.*", said),
+        "counts": _COUNTS.findall(said),
+        "skips": skips,
     }
+
+
+def lacks(part: Part) -> str:
+    """Return what a part needs and this machine does not have; empty: nothing."""
+    if not part.debian:
+        return ""
+    if os.geteuid() != 0:
+        return "a bare Debian needs root"
+    return "" if shutil.which("mmdebstrap") else "mmdebstrap is not installed: apt-get install mmdebstrap"
+
+
+def execute(folder: Path, log: Path, part: Part) -> str:
+    """Execute a part's script, with its output in the log, and return the outcome."""
+    script = in_debian(folder, part) if part.debian else on_this_machine(folder, part)
+    separate = ("unshare", "--mount", "--pid", "--fork", "--kill-child") if part.debian else ()
+    with (
+        log.open("w", encoding="utf-8") as output,
+        subprocess.Popen(
+            [*separate, "sh", "-euc", script],
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        ) as process,
+    ):
+        try:
+            if process.wait(LONGEST_S) == 0:
+                return "passed"
+        except subprocess.TimeoutExpired:
+            return "too long"
+        finally:
+            # What it started ends with it.
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    return "failed" if _READY in log.read_text("utf-8", "replace").splitlines() else "not run"
+
+
+def problem(said: str) -> str:
+    """Return the last line that names an error; if none does, the last line."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    errors = [line for line in lines if re.match(r"\W*(?:error|e|fatal)\b[:\[]", line, re.I)]
+    return (errors or lines or ["it printed nothing"])[-1]
 
 
 def remove(folder: Path) -> None:
@@ -140,15 +218,32 @@ def remove(folder: Path) -> None:
         subprocess.run(["rm", "-rf", "--one-file-system", folder], check=True)
 
 
+def all_of(part: Part, typed: Callable[[str], str]) -> list[str]:
+    """Return the end of a script: all of a part's commands, also after one that fails.
+
+    Args:
+        typed: Returns how a command is typed there.
+    """
+    lines = [f"echo {_READY}", "failed=0"]
+    for each in part.runs:
+        words = shlex.quote(each)
+        lines.append(f"echo $ {words}; {typed(each)} || {{ failed=1; echo long: failed: {words}; }}")
+    return [*lines, "exit $failed"]
+
+
 def on_this_machine(folder: Path, part: Part) -> str:
     """Return the script of a part of this machine."""
-    clone = folder / "robomesh"
+    clone, place = (shlex.quote(str(each)) for each in (folder / "robomesh", folder))
+    shared = shlex.quote(str(ROOT.parent / "shared"))
     return "\n".join(
         [
-            f"git clone --quiet {shlex.quote(str(ROOT))} {shlex.quote(str(clone))}",
-            f"cd {shlex.quote(str(clone))}",
+            f"git clone --quiet {shlex.quote(str(ROOT))} {clone}",
+            # The tests' reference files.
+            f"test ! -d {shared} || ln -s {shared} {place}",
+            f"cd {clone}",
             f"export UV_PYTHON={part.python}",
-            *part.runs,
+            part.set_up,
+            *all_of(part, lambda each: f"sh -euc {shlex.quote(each)}"),
         ]
     )
 
@@ -181,7 +276,9 @@ def in_debian(folder: Path, part: Part) -> str:
         ]
     if part.read_only_home:
         lines += [f"mount --bind {folder}{home} {folder}{home}", f"mount -o remount,ro,bind {folder}{home}"]
-    for command in part.runs:
+
+    def typed(command: str) -> str:
         words = f"cd {shlex.quote(part.folder)} && python3 -V && {command}"
-        lines.append(f"{inside} {bare} {typed_by} sh -euc {shlex.quote(words)}")
-    return "\n".join(lines)
+        return f"{inside} {bare} {typed_by} sh -euc {shlex.quote(words)}"
+
+    return "\n".join([*lines, *all_of(part, typed)])
