@@ -88,8 +88,8 @@ PARTS = {
     "first-hour": Part(
         (f"./dev run true && {_COMMANDS}",), debian="bookworm", user="newcomer", read_only_home=True
     ),
-    "page": Part((f"{_BUSY} tests/browser",)),
-    "rest": Part((f'{_BUSY} -m "not browser"',)),
+    "page": Part((f'{_BUSY} -m "long and browser"',)),
+    "rest": Part((f'{_BUSY} -m "long and not browser"',)),
     "compatibility": Part(("./dev test tests/compatibility",)),
     "elsewhere": Part((f"{_PYTHON} -m tests.long.elsewhere",)),
     "fuzzing": Part(

@@ -85,25 +85,29 @@ while not on_line or on_line[-1][1] < target[1] - 1e-6:
     time.sleep(0.01)
 there = receive.getActualTCPPose()
 control.moveL(begin, 0.2, 1.0, True)
-time.sleep(0.3)
+while receive.getActualTCPPose()[1] > target[1] - 0.02:
+    time.sleep(0.01)
 control.stopL(2.0)
 stopped = receive.getActualTCPPose()
 refused = control.moveL([3.0, *begin[1:]], 0.2, 1.0)
 control.reuploadScript()
 while not control.isProgramRunning():
     time.sleep(0.01)
-for _ in range(50):
+speed = receive.getActualTCPSpeed()
+while abs(speed[2] + 0.1) > 1e-3:
     control.speedL([0.0, 0.0, -0.1, 0.0, 0.0, 0.0], 1.0)
     time.sleep(0.01)
-speed = receive.getActualTCPSpeed()
+    speed = receive.getActualTCPSpeed()
 control.speedStop()
 joints = receive.getActualQ()
 joints[0] += 0.1
-for _ in range(100):
+reached = receive.getActualQ()
+while max(abs(a - b) for a, b in zip(reached, joints)) > 1e-3:
     control.servoJ(joints, 0.0, 0.0, 0.01, 0.1, 300)
     time.sleep(0.01)
+    reached = receive.getActualQ()
 control.servoStop()
-print(json.dumps([begin, target, on_line, there, stopped, refused, speed, joints, receive.getActualQ()]))
+print(json.dumps([begin, target, on_line, there, stopped, refused, speed, joints, reached]))
 """
 
 RECOVER = """
