@@ -72,14 +72,14 @@ def test_all_commands_of_a_part_run_and_each_that_fails_is_named(long):
 def test_parts_that_cannot_run_stop_no_other_and_the_reason_is_said_last(long, monkeypatch):
     monkeypatch.setattr(parts.os, "geteuid", lambda: 0)
     monkeypatch.setattr(parts.shutil, "which", lambda name: None)
-    no_python = "echo 'error: No interpreter found for Python 3.99'; echo 'dev: uv failed; see above'; exit 1"
+    no_network = "printf 'error: No package\\n  cause: No route\\ndev: uv failed; see above\\n'; exit 1"
     code, table, _ = long(
-        one=Part(("true",), debian="bookworm"), two=here("true"), three=here("true", set_up=no_python)
+        one=Part(("true",), debian="bookworm"), two=here("true"), three=here("true", set_up=no_network)
     )
     assert table == [["one", "not"], ["two", "passed"], ["three", "not"]]
     assert code.splitlines() == [
         "dev: one not run: mmdebstrap is not installed: apt-get install mmdebstrap",
-        "dev: three not run: error: No interpreter found for Python 3.99",
+        "dev: three not run: error: No package; cause: No route",
     ]
 
 

@@ -206,10 +206,11 @@ def execute(folder: Path, log: Path, part: Part) -> str:
 
 
 def problem(said: str) -> str:
-    """Return the last line that names an error; if none does, the last line."""
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
-    errors = [line for line in lines if re.match(r"\W*(?:error|e|fatal)\b[:\[]", line, re.I)]
-    return (errors or lines or ["it printed nothing"])[-1]
+    """Return the first line that names an error, and its innermost cause; without one, the last line."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()] or ["it printed nothing"]
+    errors = [line for line in lines if re.match(r"(?:npm )?error\b|e:|fatal:", line, re.I)]
+    causes = [line for line in lines if line.startswith("cause: ")]
+    return "; ".join((*(errors or lines[-1:])[:1], *causes[-1:]))
 
 
 def remove(folder: Path) -> None:
