@@ -102,9 +102,10 @@ PARTS = {
     "soak": Part(
         (
             f"echo long: seed {SEED}",
-            f"{_PYTHON} -m tests.soak.audit_kills --times 25 --seed {SEED}",
-            f"{_PYTHON} -m tests.soak.latch_kills --times 15",
-            f"{_PYTHON} -m tests.soak.recorder_kills --times 25 --seed {SEED}",
+            f"{_PYTHON} -m tests.soak.audit_kills --seed {SEED}",
+            f"{_PYTHON} -m tests.soak.latch_kills",
+            # Other programs may take the machine's time; how much is lost without them is a benchmark.
+            f"{_PYTHON} -m tests.soak.recorder_kills --most-lost 5 --seed {SEED}",
             f"{_PYTHON} -m tests.soak.recorder_disk",
             f"{_PYTHON} -m tests.soak.verify_joints --rest 20",
         )

@@ -206,10 +206,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--times", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--most-lost", type=float, default=MOST_LOST_S, metavar="S", help="before a kill")
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        report = asyncio.run(kills(given.times, Path(folder), seed=given.seed))
+        report = asyncio.run(kills(given.times, Path(folder), seed=given.seed, most_lost_s=given.most_lost))
     values = asdict(report)
     print(json.dumps(values) if given.json else "\n".join(f"{key}: {value}" for key, value in values.items()))
     sys.exit(1 if report.problems else 0)
