@@ -1,7 +1,7 @@
 import { defineConfig } from "vitest/config";
 
 // Each file of these gets a process: a time zone, or the arrays of Node's own realm. The others share processes.
-const ALONE = ["features/events/day", "i18n/format", "mesh/control/steps", "scene/**/*"].map(
+const ALONE = ["features/events/day", "i18n/format", "mesh/control/steps", "scene/**/*", "features/define/scene/*"].map(
   (each) => `tests/${each}.test.*`,
 );
 const ALL = "tests/**/*.test.{ts,tsx}";

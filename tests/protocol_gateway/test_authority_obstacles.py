@@ -80,6 +80,7 @@ SITUATIONS = {
     "homed unknown": in_state(homed=None),
     "homed unknown, accepted": replace(in_state(homed=None), accept_unknown=frozenset({"homed"})),
     "not homed, unknown accepted": replace(in_state(homed=False), accept_unknown=frozenset({"homed"})),
+    "joints unproven": replace(READY, positions=None, unproven=codes.JOINTS_NOT_VERIFIED(robot="arm")),
 }
 
 ALL = [
@@ -115,6 +116,7 @@ AT_REST = [name for name in ALL if name != "RESUME"]
         ("homed unknown", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
         ("homed unknown, accepted", AT_REST),
         ("not homed, unknown accepted", ["HOME", "HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
+        ("joints unproven", ["HOLD", "RESET", "TRACE_ON", "TRACE_OFF", "SPEED"]),
     ],
 )
 def test_allowed_commands_in_each_state_of_the_controller(situation, allowed):

@@ -18,6 +18,9 @@ test("undo and redo restore each state, and a new change ends the redo", async (
   ]);
   history.keep("a", false);
   expect([can(), history.redo("x")]).toEqual([[true, false], undefined]);
+  history.undo("b");
+  history.keep("a", true);
+  expect(can()).toEqual([false, false]);
   for (const state of ["b", "c", "d"]) history.keep(state, false);
   expect([history.undo("e"), history.undo("d"), history.undo("c")]).toEqual(["d", "c", undefined]);
   history.clear();
