@@ -163,8 +163,8 @@ def position(group: int) -> Steps[FilePosition]:
     while (line := (yield)) is not None:
         if found := _GROUP.fullmatch(line):
             current = int(found[1])
-            if current == group and group in numbers:
-                raise ValueError(f"group {group} is in the file twice")
+            if current in numbers:
+                raise ValueError(f"group {current} is in the file twice")
             numbers[current] = None
         elif numbers and current == group:
             part.append(line)

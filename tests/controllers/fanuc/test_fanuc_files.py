@@ -68,7 +68,8 @@ def test_number_that_does_not_fit_is_not_known():
         (lambda text: text.replace("Joint   1", "Joint   0"), "wrong order"),
         (lambda text: text.replace("Y:", "Q:"), "no part of a position"),
         (lambda text: text.replace("Y:", "X:"), "wrong order"),
-        (lambda text: text * 2, "twice"),
+        (lambda text: text * 2, "group 1 is in the file twice"),
+        (lambda text: text + position((2, AXES, PLACE)) * 2, "group 2 is in the file twice"),
         (lambda text: text.replace("CURRENT JOINT", "CURRENT WORLD"), "not whole"),
     ],
 )
