@@ -17,7 +17,7 @@ beforeEach(async () => {
 
 test("the journal is narrowed to any site with a robot or an entry", async () => {
   say({ case: "presence", value: { key: "robomesh/hall/arm/alive/gateway/1", alive: true } });
-  publish("robomesh/yard/-/events/watch", EventSchema, { timestamp: timestampFromMs(Date.now()), code: "x", text: "x" });
+  publish("robomesh/yard/-/events/watch", EventSchema, { timestamp: timestampFromMs(Date.now()), text: "x" });
   await pass(1500);
   expect(texts('select[aria-label="Site"] option')).toEqual(["All sites", "hall", "yard"]);
 });

@@ -14,9 +14,10 @@ beforeEach(async () => {
 });
 
 test("a site without a watch has its present services, one with a watch what that reports", async () => {
-  const alive = (key: string) => say({ case: "presence", value: { key: `robomesh/${key}`, alive: true } });
-  for (const key of ["yard/-/alive/console/1", "yard/-/alive/console/2", "yard/-/alive/store/1", "hall/-/alive/watch/1"])
-    alive(key);
+  const alive = (site: string, id: string) =>
+    say({ case: "presence", value: { key: `robomesh/${site}/-/alive/${id}`, alive: true } });
+  for (const id of ["console/1", "console/2", "store/1"]) alive("yard", id);
+  alive("hall", "watch/1");
   publish("robomesh/hall/-/mesh", MeshStateSchema, { services: [{ site: "hall", service: "watch", id: "1" }] });
   await pass(1500);
   expect([texts("h3"), texts(".services"), texts("tbody tr").length]).toEqual([
