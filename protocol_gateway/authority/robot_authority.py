@@ -336,8 +336,9 @@ class RobotAuthority:
         if problem is None and command.is_immediate:
             cancelled = yield decisions.CancelPrograms(codes.PROGRAM_HOLD())
             rests = self._authority.moving is False and self._authority.motion is None
-            # A HOLD sent to an arm at rest would make the controller refuse every motion.
-            sends = not (cancelled and rests and self._program is None)
+            # A HOLD sent to an arm at rest would make the controller refuse every motion. The end of a jog
+            # has its own HOLD; this one waits for the disk, and could follow the RESET that ends the jog.
+            sends = not (self._program.program.is_jog if self._program else cancelled and rests)
         if problem is None:
             seen = yield decisions.EnterCell(command.requests)
             problem = evaluation.refusal_of(command, self._authority, self._program, seen, self._joints)
@@ -407,7 +408,7 @@ class RobotAuthority:
             yield decisions.PublishState()
             return f"{changes}: confirmed"
         if unit is None:
-            return f"{command.names}: the program was not started, and nothing is on hold"
+            return f"{command.names}: nothing is started any more, and nothing is on hold"
         for request in command.requests:
             latched, target = self._authority.stop, target_of(request, controller, self._joints)
             self._authority = motion_owner.record_command(

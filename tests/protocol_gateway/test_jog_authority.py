@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from protocol_gateway.authority.audit_entry import Outcome
 from protocol_gateway.authority.decisions import CheckVerdict, PlannedProgram
 from protocol_gateway.authority.events import JogEnding, JogHeld, JogPartReady
 from protocol_gateway.seam import Activity
@@ -116,6 +117,17 @@ async def test_no_command_moves_the_robot_on_after_the_end_of_a_jog(tmp_path):
             answer = await bench.control.attempt([resume], operator="li", source="test")
             assert answer.reason.code == "jog.runs"
         assert bench.socket[1:] == [b"1#COMMAND*hold@"]
+
+
+async def test_a_hold_ends_a_jog_and_is_not_sent_again_to_an_arm_that_may_rest_by_then(tmp_path):
+    async with control_bench(tmp_path) as bench:
+        await begun(bench)
+        assert part(bench) is None
+        for number in (2, 3):
+            hold = schema.CommandRequest(lease=bench.secret, id=number, command=C.HOLD)
+            assert (await bench.control.attempt([hold], operator="li", source="test")).accepted
+        assert bench.socket[1:] == [b"1#COMMAND*hold@"]
+        assert bench.entries()[2:] == [("HOLD", Outcome.ACCEPTED)] * 2
 
 
 async def test_the_end_of_its_line_holds_no_arm_that_rests(tmp_path):

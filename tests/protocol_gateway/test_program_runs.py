@@ -71,7 +71,7 @@ def states(site):
 async def ended(site, outcome, timeout_s=60):
     async with asyncio.timeout(timeout_s):
         while not states(site) or states(site)[-1].outcome != outcome:
-            await site.lease(A.RENEW, ttl_s=5)
+            await site.lease(A.RENEW)
             await asyncio.sleep(0.1)
     return states(site)[-1]
 
@@ -105,7 +105,7 @@ async def test_a_program_runs_to_its_end_and_publishes_its_steps(mesh, tmp_path,
         gateway(mesh, tmp_path, port, check=check, cell=one_robot_cell(POST)) as site,
     ):
         await until(lambda: not site.controller.check_text, timeout_s=60)
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         answer = await start(site, GOOD)
         assert answer.text == "RUN_PROGRAM: it runs"
         done = await ended(site, RUN.DONE)
@@ -163,7 +163,7 @@ async def test_a_stop_ends_a_program_for_good(mesh, tmp_path):
         await until(lambda: site.controller.activity == STATE.STOPPED)
         await asyncio.sleep(0.5)
         await site.command(C.RESET, stop_id=site.controller.stop.id)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         where = list(site.joints)
         await asyncio.sleep(1.0)
         assert list(site.joints) == pytest.approx(where, abs=1e-3)
@@ -171,7 +171,7 @@ async def test_a_stop_ends_a_program_for_good(mesh, tmp_path):
 
 async def test_a_program_that_could_not_start_is_refused(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         text = await refusal(start(site, "speed 50\nmove_joints -40 90 -90 0 0\n"))
         assert "not homed" in text
         assert site.controller.counters.units_sent == 0
@@ -200,7 +200,7 @@ async def test_a_held_program_continues_with_resume(mesh, tmp_path):
         await until(lambda: site.controller.activity == STATE.HOLDING)
         held = len(states(site))
         await until(lambda: len(states(site)) >= held + 3)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         assert states(site)[-1].outcome == RUN.RUNNING
         # No time passes during the hold: a part of the first motion is left, and the whole second.
         assert states(site)[-1].left_s == states(site)[held].left_s > 0.5
@@ -238,7 +238,7 @@ async def test_a_program_held_between_two_motions_waits(mesh, tmp_path):
         await site.command(C.HOLD)
         await until(lambda: site.controller.activity == STATE.HOLDING)
         await asyncio.sleep(1.5)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         assert states(site)[-1].outcome == RUN.RUNNING
         await site.command(C.RESUME)
         await ended(site, RUN.DONE)
@@ -257,7 +257,7 @@ async def test_a_held_program_ends_with_reset(mesh, tmp_path):
         state = await ended(site, RUN.ENDED)
         assert state.text == "cancelled by RESET"
         await until(lambda: site.controller.activity == STATE.IDLE)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await asyncio.sleep(1.5)
         assert list(site.joints) == pytest.approx(where, abs=1e-3)
 
@@ -283,9 +283,9 @@ async def planned(site):
 async def in_control(site):
     """Renew the lease, or acquire it again if it expired on a busy machine."""
     try:
-        return await site.lease(A.RENEW, ttl_s=5)
+        return await site.lease(A.RENEW)
     except RefusedError:
-        return await site.lease(A.ACQUIRE, ttl_s=5)
+        return await site.lease(A.ACQUIRE)
 
 
 def gave_up(site):
@@ -310,7 +310,7 @@ async def plain_run(site, timeout_s, **fields):
 @pytest.mark.parametrize("has_timeout", [True, False])
 async def test_a_program_is_not_run_after_its_senders_timeout(mesh, tmp_path, has_timeout):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        lease = await site.lease(A.ACQUIRE, ttl_s=5)
+        lease = await site.lease(A.ACQUIRE)
         await planned(site)
         lease = await in_control(site)
         with slow_check():
@@ -364,15 +364,15 @@ def test_the_earlier_deadline_counts():
 
 async def test_a_hold_cancels_a_program_during_its_check(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await planned(site)
         with slow_check():
             asked = asyncio.create_task(refusal(start(site, "home\n")))
             await until(lambda: site.id == 2)
-            await site.lease(A.RENEW, ttl_s=5)
+            await site.lease(A.RENEW)
             await asyncio.sleep(0.3)  # the gateway has it by then; otherwise HOLD finds nothing to cancel
             answer = await site.command(C.HOLD)
-            assert answer.text == "HOLD: the program was not started, and nothing is on hold"
+            assert answer.text == "HOLD: nothing is started any more, and nothing is on hold"
             assert await asked == "Not run: HOLD arrived during its check: not started."
         await in_control(site)
         await planned(site)
@@ -385,7 +385,7 @@ async def test_a_hold_cancels_a_program_during_its_check(mesh, tmp_path):
 
 async def test_a_stop_cancels_a_program_during_its_check(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await planned(site)
         with slow_check():
             asked = asyncio.create_task(refusal(start(site, "home\n")))
@@ -397,16 +397,16 @@ async def test_a_stop_cancels_a_program_during_its_check(mesh, tmp_path):
 
 async def test_a_held_homing_continues_with_resume(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.HOME)
         await until(lambda: site.controller.activity == STATE.HOMING)
         await site.command(C.HOLD)
         await until(lambda: site.controller.activity == STATE.HOLDING)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await site.command(C.RESUME)
         async with asyncio.timeout(50):
             while site.controller.homed != STATE.YES:
-                await site.lease(A.RENEW, ttl_s=5)
+                await site.lease(A.RENEW)
                 await asyncio.sleep(0.2)
 
 
