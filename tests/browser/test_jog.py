@@ -42,7 +42,7 @@ def jog_page(open_page):
 
 def entries(plant):
     key = "robomesh/hall/arm/audit"
-    found = plant.call(plant.session.last(key, timeout_s=15)).entries
+    found = plant.call(plant.session.last(key, timeout_s=40)).entries
     jogs = [each for each in found if each.request in ("JOG", "JOG_END")]
     return [each for each in jogs if each.outcome != each.REFUSED]
 

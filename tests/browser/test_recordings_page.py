@@ -59,7 +59,7 @@ def recorded(plant, tmp_path_factory):
         tasks = [plant.loop.create_task(each) for each in serving]
         await ask_recorder(plant, _Ask.TRACE_ON, name=NAME)
         acquire = schema.LeaseRequest(action=schema.LeaseRequest.ACQUIRE, ttl_s=0.5)
-        await own.ask(f"{ROBOT}/lease/request/li", acquire, timeout_s=15.0)
+        await own.ask(f"{ROBOT}/lease/request/li", acquire, timeout_s=40.0)
         async with asyncio.timeout(40):
             async for sample in own.subscribe(f"{ROBOT}/recording"):
                 recording = sample.message()
@@ -139,7 +139,7 @@ def with_runs(path):
 
 
 async def ask_recorder(plant, action, **values):
-    return await plant.session.ask(f"{ROBOT}/recorder/request", _Ask(action=action, **values), timeout_s=15.0)
+    return await plant.session.ask(f"{ROBOT}/recorder/request", _Ask(action=action, **values), timeout_s=40.0)
 
 
 def joints_in(recording):
@@ -413,5 +413,5 @@ def test_a_note_on_a_recording_is_beside_it_and_its_file_is_unchanged(noted, rec
 async def ask_info(plant, file):
     """Return the size of a recording and its number of messages of each topic."""
     query = schema.RecordingQuery(file=file)
-    info = await plant.session.ask(f"robomesh/hall/{WHOLE_SITE}/recordings/info", query, timeout_s=15.0)
+    info = await plant.session.ask(f"robomesh/hall/{WHOLE_SITE}/recordings/info", query, timeout_s=40.0)
     return info.bytes, [(each.topic, each.messages) for each in info.topics]

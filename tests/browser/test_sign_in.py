@@ -74,7 +74,7 @@ def sign_in(page, name, password=PASSWORD):
 
 def asked_by(plant, request):
     """Return the operators of these requests in the gateway's audit log."""
-    asked = plant.session.ask("robomesh/hall/arm/audit/find", AuditQuery(request=request), timeout_s=10)
+    asked = plant.session.ask("robomesh/hall/arm/audit/find", AuditQuery(request=request), timeout_s=40)
     return [entry.operator for entry in plant.call(asked).entries]
 
 

@@ -123,7 +123,7 @@ class Mover:
         site = self.site
         await until(lambda: site.seen.get("controller") and site.controller.mode == STATE.REMOTE)
         await until(lambda: site.joints)
-        await site.lease(A.RENEW if site.secret else A.ACQUIRE, ttl_s=5)
+        await site.lease(A.RENEW if site.secret else A.ACQUIRE)
         await until(lambda: site.controller.capabilities.stops == self.stops)
 
     async def move(self, by, **fields):
@@ -155,7 +155,7 @@ class Mover:
         """Command a motion as soon as it is taken, which a controller's state may need a moment for."""
         async with asyncio.timeout(30.0):
             while True:
-                await self.site.lease(A.RENEW, ttl_s=5)
+                await self.site.lease(A.RENEW)
                 with contextlib.suppress(RefusedError):
                     return await self.move(by)
                 await asyncio.sleep(0.05)
@@ -163,7 +163,7 @@ class Mover:
     async def reset(self):
         """Reset the latched stop, as the manual of the controller says."""
         await until(lambda: self.site.controller.activity in (STATE.IDLE, STATE.STOPPED))
-        await self.site.lease(A.RENEW, ttl_s=5)
+        await self.site.lease(A.RENEW)
         await self.site.command(C.RESET, stop_id=self.site.controller.stop.id)
 
     # ------------------------------------------------------------------------ the controller
@@ -495,7 +495,7 @@ class HsesMover(Mover):
         self.arm.switch_servos(False, time.monotonic())
         async with asyncio.timeout(30.0):
             while self.site.controller.HasField("stop"):
-                await self.site.lease(A.RENEW, ttl_s=5)
+                await self.site.lease(A.RENEW)
                 with contextlib.suppress(RefusedError):
                     await self.site.command(C.RESET, stop_id=self.site.controller.stop.id)
                 await asyncio.sleep(0.05)

@@ -29,7 +29,7 @@ from tests.protocol_gateway.gateway_site import (
 )
 
 pytestmark = pytest.mark.slow
-QUICK = {"stale_after_s": 0.5, "reconnect_after_s": 1.5}
+QUICK = {"stale_after_s": 1.5, "reconnect_after_s": 3.0}
 
 
 def id_of(value):
@@ -110,7 +110,7 @@ async def test_local_control_and_back_within_a_motion_never_continues_it(mesh, t
         arm.go_local()
         await until(lambda: arm.site.controller.mode == STATE.LOCAL)
         await until(lambda: stops(arm) == arm.local_stops)
-        await arm.site.lease(A.RENEW, ttl_s=5)
+        await arm.site.lease(A.RENEW)
         await until(lambda: arm.site.controller.HasField("stop"))
         allowed = {arm.causes.get("local"), "stop.went_local", "stop.fate_unknown"}
         assert codes_of(arm.site.controller.stop.why) & allowed
@@ -176,7 +176,7 @@ async def test_in_local_control_a_stop_ends_a_program_of_others_only_if_the_stat
         assert not arm.site.controller.HasField("stop")
         await until(lambda: arm.site.controller.activity == STATE.MOVING)
         await arm.site.units(20)
-        await arm.site.lease(A.ACQUIRE, ttl_s=5)
+        await arm.site.lease(A.ACQUIRE)
         if not arm.replaces:
             await refusal(arm.move(0.1))
         arm.go_local()
@@ -207,7 +207,7 @@ async def test_a_tool_changed_by_others_leaves_motions_unchecked_and_ends_one(
         await until(lambda: not arm.site.controller.check_text)
         undo = arm.change_tool()
         await until(lambda: arm.site.controller.check_reason.code == "check.tool_changed")
-        await arm.site.lease(A.RENEW, ttl_s=5)
+        await arm.site.lease(A.RENEW)
         assert "were changed at the controller" in await refusal(arm.move(0.1))
         undo()
         await until(lambda: not arm.site.controller.check_text)
@@ -224,7 +224,7 @@ async def test_a_tool_changed_by_others_leaves_motions_unchecked_and_ends_one(
 async def test_one_corrupted_position_stops_the_motion_and_is_never_published(
     mesh, tmp_path, monkeypatch, mover
 ):
-    async with mover.started(mesh, tmp_path, monkeypatch) as arm:
+    async with mover.started(mesh, tmp_path, monkeypatch, **QUICK) as arm:
         target = await arm.begin()
         arm.corrupt()
         await until(lambda: arm.site.controller.HasField("stop"))
@@ -255,7 +255,7 @@ async def test_motion_needs_the_connection_of_its_stop(mesh, tmp_path, monkeypat
         arm.cut_stop()
         await until(lambda: stops(arm) == NOT_NOW)
         assert arm.site.controller.link == STATE.UP
-        await arm.site.lease(A.RENEW, ttl_s=5)
+        await arm.site.lease(A.RENEW)
         assert "a stop could not be sent" in await refusal(arm.move(0.1))
         judge(arm, motions=0)
         await arm.mend_stop()
@@ -348,9 +348,9 @@ async def test_a_taken_seat_is_named_and_forbids_motion(mesh, tmp_path, monkeypa
     async with mover.started(mesh, tmp_path, monkeypatch, prepare=mover.take_seat, up=False) as arm:
         site = arm.site
         await until(lambda: site.seen.get("controller"))
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await until(lambda: any(arm.seat in each.text for each in site.seen["events"]))
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await refusal(arm.move(0.1))
         judge(arm, motions=0)
         arm.free_seat()
@@ -370,7 +370,7 @@ async def test_a_fault_of_the_controller_ends_the_motion_for_good(mesh, tmp_path
         shown = arm.fault_is_shown_as
         await until(lambda: arm.site.controller.activity == shown)
         await until(lambda: not arm.moves())
-        await arm.site.lease(A.RENEW, ttl_s=5)
+        await arm.site.lease(A.RENEW)
         await refusal(arm.move(0.1))
         arm.end_fault("fault")
         await until(lambda: arm.site.controller.activity != shown)
@@ -531,7 +531,7 @@ def test_the_motions_of_a_gateway_that_was_frozen_end_when_it_goes_on(mesh, tmp_
                 async with kept_control(*(each.site for each in arms)):
                     await all_crawl(arms)
                 for arm in arms:
-                    await arm.site.lease(A.RENEW, ttl_s=5)
+                    await arm.site.lease(A.RENEW)
                 sent = [each.motions for each in arms]
                 with frozen(process):
                     late = [asyncio.create_task(refusal(each.move(-0.1))) for each in arms]

@@ -6,6 +6,7 @@ import pytest
 
 from protocol_gateway.authority.lease_rules import Now
 from protocol_gateway.execution import control
+from tests.patience import wait_patiently
 
 
 def later(now, seconds):
@@ -29,3 +30,14 @@ def clock(monkeypatch):
     clock = Clock()
     monkeypatch.setattr(control, "read_clocks", lambda: clock.now)
     return clock
+
+
+@pytest.fixture
+def mesh(request, mesh, monkeypatch):
+    """Return session settings; a gateway in the test's process waits longer than a busy machine does.
+
+    Not with the marker `exact_times`: there a command waits at most 1 s, and a lease lasts at most 5 s.
+    """
+    if request.node.get_closest_marker("exact_times") is None:
+        wait_patiently(monkeypatch.setattr)
+    return mesh

@@ -13,24 +13,42 @@ import pytest
 from controllers.unit.simulated.service import Settings as SimulatorSettings
 from controllers.unit.simulated.service import serve as simulate
 from protocol_gateway.gateway import RobotSettings, Settings, serve
-from robomesh import reason_codes as codes
 from robomesh.errors import RefusedError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from tests.conftest import last_value
+from tests.patience import PATIENCE_S
 
 C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action
 STATE = schema.ControllerState
 REPOSITORY = Path(__file__).resolve().parents[2]
 TOPICS = ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw", "program")
+LOOK_S = 0.01
+# Longer than a busy machine stands still, for whatever is not a test's subject.
+LEASE_S = 20.0
+PATIENT = {"stale_after_s": 10.0, "reconnect_after_s": 20.0}
+# What a robot has without these settings.
+PROMPT = {"stale_after_s": 1.0, "reconnect_after_s": 4.0}
 
 
-async def until(condition, timeout_s=30.0):
+async def until(condition, timeout_s=60.0):
     async with asyncio.timeout(timeout_s):
         while not condition():
-            await asyncio.sleep(0.01)
+            await asyncio.sleep(LOOK_S)
     return condition()
+
+
+async def looks_until(condition):
+    """Wait for a condition, and return how many turns of the event loop, one each `LOOK_S`, it took.
+
+    On a machine that stands still, they are delayed with the gateway, which runs in the same loop.
+    """
+    looks = 0
+    while not condition():
+        await asyncio.sleep(LOOK_S)
+        looks += 1
+    return looks
 
 
 @dataclass
@@ -68,14 +86,14 @@ class GatewaySite:
         return self.events(code)[number]
 
     async def stop(self, **fields):
-        return await self.session.ask(self.key("stop"), schema.StopRequest(**fields))
+        return await self.session.ask(self.key("stop"), schema.StopRequest(**fields), timeout_s=PATIENCE_S)
 
     async def lease(self, action, operator="li", **fields):
         if action in (A.RENEW, A.RELEASE, A.OFFER):
             fields.setdefault("lease", self.secret)
-        answer = await self.session.ask(
-            self.key(f"lease/request/{operator}"), schema.LeaseRequest(action=action, **fields)
-        )
+        request = schema.LeaseRequest(action=action, **{"ttl_s": LEASE_S, **fields})
+        key = self.key(f"lease/request/{operator}")
+        answer = await self.session.ask(key, request, timeout_s=PATIENCE_S)
         self.secret = answer.lease or self.secret
         return answer
 
@@ -83,7 +101,7 @@ class GatewaySite:
         self.id += 1
         fields = {"lease": self.secret, "id": self.id, **fields}
         request = schema.CommandRequest(command=command, **fields)
-        return await self.session.ask(self.key(f"command/{operator}"), request, timeout_s=10.0)
+        return await self.session.ask(self.key(f"command/{operator}"), request, timeout_s=PATIENCE_S)
 
     async def units(self, number):
         """Wait until the gateway has published this many more units of the controller."""
@@ -93,19 +111,12 @@ class GatewaySite:
 
     async def home(self):
         """Acquire control and home, and wait until the motion has demonstrably ended."""
-        await self.lease(A.ACQUIRE, ttl_s=5)
-        while True:
-            try:
-                await self.command(C.HOME)
-                break
-            except RefusedError as error:
-                # A busy machine took longer than a second for it.
-                if error.code != codes.COMMAND_WAITED.name:
-                    raise
+        await self.lease(A.ACQUIRE)
+        await self.command(C.HOME)
         await until(lambda: self.controller.homed == STATE.YES)
         await until(lambda: self.controller.activity in (STATE.IDLE, STATE.ACTIVITY_UNKNOWN))
         await self.units(3)
-        await self.lease(A.RENEW, ttl_s=5)
+        await self.lease(A.RENEW)
 
 
 @contextlib.asynccontextmanager
@@ -115,7 +126,7 @@ async def kept_control(*sites):
     async def renew():
         while True:
             for site in sites:
-                await site.lease(A.RENEW, ttl_s=5)
+                await site.lease(A.RENEW)
             await asyncio.sleep(0.5)
 
     renewing = asyncio.create_task(renew())
@@ -159,6 +170,7 @@ async def gateway(mesh, folder, *ports, up=True, each=(), **robot):
                     "host": "127.0.0.1",
                     "port": port,
                     "stop_proven": True,
+                    **PATIENT,
                     **robot,
                     **own_settings,
                 }

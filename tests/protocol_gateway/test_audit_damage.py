@@ -184,7 +184,7 @@ def test_changed_bytes_never_lose_a_latched_stop(tmp_path_factory, data):
 async def test_a_damaged_log_stops_the_robot_until_a_reset(mesh, tmp_path):
     async with simulator() as port:
         async with gateway(mesh, tmp_path, port) as site:
-            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.lease(A.ACQUIRE)
             await site.stop(by="wang", reason="dog")
             await until(lambda: len(site.seen["audit"]) >= 2)
         live = site.audit
@@ -195,7 +195,7 @@ async def test_a_damaged_log_stops_the_robot_until_a_reset(mesh, tmp_path):
             assert "the chain is broken at entry 2" in (await site.event("audit.damaged", 0)).text
             assert await site.event("stop.remembered", 0)
             await until(lambda: "STOP" in [each.request for each in site.seen["audit"]])
-            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.lease(A.ACQUIRE)
             assert UNKNOWN in await refusal(site.command(C.HOME))
             await site.command(C.RESET, stop_id=stop.id)
             await until(lambda: not site.controller.HasField("stop"))

@@ -101,7 +101,7 @@ async def test_after_a_flood_of_stops_a_restart_restores_the_last(mesh, tmp_path
         assert len(entries) < 40
         async with gateway(mesh, tmp_path, port) as site:
             assert site.controller.stop.id == last
-            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.lease(A.ACQUIRE)
             stops = [await site.stop(by=by(number)) for number in range(20)]
             await site.command(C.RESET, stop_id=stops[-1].stop_id)
         async with gateway(mesh, tmp_path, port) as site:
@@ -112,7 +112,7 @@ async def test_after_a_flood_of_stops_a_restart_restores_the_last(mesh, tmp_path
 async def test_entries_are_found_over_the_mesh_by_operator_request_and_time(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
         await refusal(site.command(C.HOME, operator="wang"))
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.TRACE_ON)
         await site.stop(by="wang")
         await until(lambda: len(site.seen["audit"]) >= 4)
@@ -159,7 +159,7 @@ async def test_the_command_lists_entries_of_robots_and_of_log_files(mesh, router
     async with simulator() as one, simulator() as two, gateway(mesh, tmp_path, one, two) as site:
         await refusal(site.command(C.HOME))
         await site.session.ask("robomesh/hall/arm-2/stop", schema.StopRequest(by="wang", reason="dog"))
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await until(lambda: len(site.seen["audit"]) >= 2)
         # Clients find robots by the presence of their services.
         for robot in ("arm", "arm-2"):
@@ -284,7 +284,7 @@ async def on_a_full_disk(site, log, full, words):
         # The rest of the log's last page can still be written.
         with contextlib.suppress(RefusedError):
             for _ in range(40):
-                await site.lease(A.RENEW, ttl_s=5)
+                await site.lease(A.RENEW)
                 await site.command(C.TRACE_ON)
         text = await refusal(site.command(C.HOME))
         assert f"{words}: make space on its disk); a command that cannot be recorded is not executed" in text
@@ -295,7 +295,7 @@ async def on_a_full_disk(site, log, full, words):
         assert "STOP" not in [entry.request for entry in read_entries(log)]
     await until(lambda: site.events("audit.mended"))
     assert "STOP" in [entry.request for entry in read_entries(log)]
-    await site.lease(A.RENEW, ttl_s=5)
+    await site.lease(A.RENEW)
     await site.command(C.RESET, stop_id=stop.stop_id)
     assert verify(log).ok
 
@@ -329,6 +329,7 @@ def test_on_a_full_disk_stop_works_and_motion_is_refused(mesh, tmp_path):
     run(main(), timeout_s=60.0)
 
 
+@pytest.mark.exact_times
 async def test_a_disk_that_hangs_delays_no_stop(mesh, tmp_path, monkeypatch):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
         await site.home()

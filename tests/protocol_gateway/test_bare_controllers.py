@@ -1,7 +1,17 @@
 """Controllers that report little, or only unknown records, or have no proven stop."""
 
 from robomesh.schemas import robomesh_pb2 as schema
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, measured, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import (
+    PROMPT,
+    STATE,
+    A,
+    C,
+    gateway,
+    measured,
+    refusal,
+    simulator,
+    until,
+)
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
 
 
@@ -11,19 +21,19 @@ async def test_a_controller_with_positions_only_is_commanded_if_the_site_file_ac
         repeated(say, lambda: "1#ABSOLUTE.DEG*1;90;-90;0;0@"),
     ):
         async with gateway(mesh, tmp_path, port) as site:
-            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.lease(A.ACQUIRE)
             assert 'accept_unknown = ["mode"]' in await refusal(site.command(C.HOME))
             await site.command(C.HOLD)
             assert site.controller.homed == STATE.UNKNOWN
         async with gateway(mesh, tmp_path, port, accept_unknown=frozenset({"mode"})) as site:
-            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.lease(A.ACQUIRE)
             where = [0, 1.5, -1.5, 0, 0]
             text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=where))
             assert 'accept_unknown = ["homed"]' in text
             await site.command(C.HOME)
         both = frozenset({"mode", "homed"})
         async with gateway(mesh, tmp_path, port, accept_unknown=both) as site:
-            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.lease(A.ACQUIRE)
             assert "stop 1 is latched" in await refusal(site.command(C.HOME))
             await site.command(C.RESET, stop_id=1)
             await site.command(C.MOVE_ABSOLUTE, joint_positions=where)
@@ -31,7 +41,10 @@ async def test_a_controller_with_positions_only_is_commanded_if_the_site_file_ac
 
 
 async def test_records_of_unknown_types_are_published_raw(mesh, tmp_path):
-    async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
+    async with (
+        scripted_controller() as (port, say, _),
+        gateway(mesh, tmp_path, port, up=False, **PROMPT) as site,
+    ):
         await until(lambda: site.controller.link == STATE.SILENT)
         say("2#TEMPERATURE*41.5;ok&4711*1@")
         await until(lambda: len(site.seen["raw"]) >= 2)
@@ -75,9 +88,9 @@ async def test_stale_positions_are_not_used(mesh, tmp_path):
     async with (
         scripted_controller() as (port, say, _),
         repeated(say, state),
-        gateway(mesh, tmp_path, port) as site,
+        gateway(mesh, tmp_path, port, **PROMPT) as site,
     ):
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await until(lambda: measured(site, "joints_stale") == {"arm": 0.0})
         positions = ""
         await until(lambda: site.events("joints.gone"))
@@ -88,5 +101,5 @@ async def test_stale_positions_are_not_used(mesh, tmp_path):
         assert "the robot's position is unknown" in text
         positions = "ABSOLUTE.DEG*1;2;3;4;5&"
         await until(lambda: "positions" not in site.controller.link_text)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await site.command(C.MOVE_RELATIVE, joint_positions=[0.1] * 5)

@@ -23,13 +23,13 @@ async def test_in_local_mode_motion_is_refused_until_it_is_remote_again(mesh, tm
         await fault("local")
         await until(lambda: site.controller.mode == STATE.LOCAL)
         await until(lambda: site.events("controller.local"))
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         assert "local mode: switch it to remote" in await refusal(site.command(C.HOME))
         assert site.controller.counters.units_sent == 0
         await fault("local", off=True)
         await until(lambda: site.controller.mode == STATE.REMOTE)
         await until(lambda: site.events("controller.remote"))
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await site.command(C.HOME)
         await until(lambda: site.controller.homed == STATE.YES)
 
@@ -42,7 +42,7 @@ async def test_a_fault_is_reported_and_cleared_by_reset(mesh, tmp_path):
         await until(lambda: "overheated" in site.controller.fault)
         await until(lambda: site.events("controller.fault"))
         assert "overheated" in (await site.event("controller.fault", -1)).text
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         assert "overheated" in await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=FAR))
         await site.command(C.RESET)
         await until(lambda: site.controller.activity == STATE.IDLE)

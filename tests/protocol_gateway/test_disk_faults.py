@@ -6,6 +6,8 @@ import os
 import time
 from pathlib import Path
 
+import pytest
+
 from protocol_gateway.audit.log import read_entries, verify
 from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
 
@@ -55,9 +57,10 @@ async def test_on_a_full_disk_a_stop_works_and_is_written_later(mesh, tmp_path):
     ]
 
 
+@pytest.mark.exact_times
 async def test_a_command_that_waited_for_a_slow_disk_is_not_sent(mesh, tmp_path, monkeypatch):
     async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         fsync = os.fsync
 
         def slow(file):
@@ -73,7 +76,7 @@ async def test_a_command_that_waited_for_a_slow_disk_is_not_sent(mesh, tmp_path,
         await until(lambda: site.events("audit.failed"))
         monkeypatch.setattr(os, "fsync", fsync)
         await until(lambda: site.seen["audit"][-1].request == "SPEED")
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await site.command(C.TRACE_OFF)
         await until(lambda: site.controller.counters.units_sent == 1)
     outcomes = [(each.request, each.outcome) for each in read_entries(site.audit)]

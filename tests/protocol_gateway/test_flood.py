@@ -12,7 +12,17 @@ from protocol_gateway.link.timestamping import EventTime
 from protocol_gateway.seam import Activity, JointsReceived, Mode, Refused, StatusReceived
 from robomesh.contract.keys import robot_key
 from tests.conftest import run
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, none_left_out, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import (
+    PROMPT,
+    STATE,
+    A,
+    C,
+    gateway,
+    none_left_out,
+    refusal,
+    simulator,
+    until,
+)
 from tests.protocol_gateway.old_client import legacy, program
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
 
@@ -144,14 +154,14 @@ async def test_a_single_status_in_a_flood_is_used_and_relayed(mesh, tmp_path):
     settings = legacy(commanders={})
     async with (
         scripted_controller() as (port, say, heard),
-        gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
+        gateway(mesh, tmp_path, port, up=False, **PROMPT, legacy_clients=settings) as site,
     ):
         await until(lambda: site.controller.link == STATE.SILENT)
         say("1#STATUS*idle;remote;homed@" + UNIT % 1.0)
         await until(lambda: site.controller.mode == STATE.REMOTE)
         async with program(settings) as old, flooding(say):
             await until(lambda: site.controller.health.flooding)
-            await site.lease(A.ACQUIRE, ttl_s=5)
+            await site.lease(A.ACQUIRE)
             for mode, known in (("local", STATE.LOCAL), ("remote", STATE.REMOTE)) * 3:
                 say(UNIT % 1.0 * 3 + f"1#STATUS*idle;{mode};homed@" + UNIT % 1.0 * 3)
                 await until(lambda known=known: site.controller.mode == known)
@@ -169,7 +179,7 @@ async def test_of_a_flood_the_newest_is_published_200_times_a_second(mesh, tmp_p
     settings = legacy(commanders={})
     async with (
         scripted_controller() as (port, say, _),
-        gateway(mesh, tmp_path, port, up=False, legacy_clients=settings) as site,
+        gateway(mesh, tmp_path, port, up=False, **PROMPT, legacy_clients=settings) as site,
     ):
         await until(lambda: site.controller.link == STATE.SILENT)
         async with program(settings) as old, flooding(say):
@@ -227,7 +237,7 @@ def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):
         async with (
             deluging() as (port, on, heard),
             simulator(demo=True) as calm_port,
-            gateway(mesh, tmp_path, port, calm_port, up=False) as site,
+            gateway(mesh, tmp_path, port, calm_port, up=False, **PROMPT) as site,
         ):
             await until(
                 lambda: "sends far too much data: all of it is discarded" in site.controller.link_text
@@ -245,11 +255,11 @@ def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):
             taken, begin_s = site.controller.counters.bytes_received, time.monotonic()
             for _ in range(300):
                 await anext(calm)
-            elapsed_s = time.monotonic() - begin_s
             assert await none_left_out(site.session, calm, "arm-2")
             # The state is published each second.
             await until(lambda: site.controller.counters.bytes_received > taken)
             taken = site.controller.counters.bytes_received - taken
+            elapsed_s = time.monotonic() - begin_s
             assert taken < 5e6 * (elapsed_s + 2.0)
             assert len(site.seen["joints"]) == joints
             # Longer than the reconnect timeout of a silent controller.
@@ -266,7 +276,10 @@ def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):
 
 
 async def test_of_undated_delayed_units_only_the_newest_is_published(mesh, tmp_path):
-    async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
+    async with (
+        scripted_controller() as (port, say, _),
+        gateway(mesh, tmp_path, port, up=False, **PROMPT) as site,
+    ):
         await until(lambda: site.controller.link == STATE.SILENT)
         for first in (1.0, 2.0):
             say(UNIT % first)
@@ -290,7 +303,10 @@ async def test_live_positions_after_a_gap_are_all_published(mesh, tmp_path):
         waist += 1
         return UNIT % (0.1 * waist)
 
-    async with scripted_controller() as (port, say, _), gateway(mesh, tmp_path, port, up=False) as site:
+    async with (
+        scripted_controller() as (port, say, _),
+        gateway(mesh, tmp_path, port, up=False, **PROMPT) as site,
+    ):
         await until(lambda: site.controller.link == STATE.SILENT)
         say(state())
         await asyncio.sleep(0.5)

@@ -9,8 +9,14 @@ import sys
 import psutil
 import pytest
 
+from tests.patience import be_patient
 from tests.protocol_gateway.gateway_site import STATE, gateway, simulator, until
 from tests.robomesh.forking_script import WAYS
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    be_patient(monkeypatch.setattr)
 
 
 @contextlib.asynccontextmanager

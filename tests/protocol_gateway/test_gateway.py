@@ -26,8 +26,8 @@ async def test_a_controllers_units_are_published_as_joint_states(mesh, tmp_path)
         assert all(joint.HasField("velocity") for joint in last.joints)
         assert first != last
         # Ten a second, even if the simulated controller sent fewer.
-        took_s = (last.timestamp.ToNanoseconds() - first.timestamp.ToNanoseconds()) * 1e-9
-        assert 0.5 * 10.0 * took_s < len(site.seen["joints/slow"]) < 1.2 * 10.0 * took_s + 3
+        tenths = len({each.timestamp.ToNanoseconds() // 100_000_000 for each in site.seen["joints"]})
+        assert 0.5 * tenths < len(site.seen["joints/slow"]) < 1.2 * tenths + 3
         assert site.controller.mode == STATE.REMOTE
         assert last.timestamp.ToNanoseconds() <= time.time_ns()
 
@@ -71,7 +71,7 @@ async def test_home_and_move_reach_their_targets(mesh, tmp_path):
 async def test_an_operator_keeps_control_of_an_arm_in_a_demonstration(mesh, tmp_path):
     async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as site:
         await until(lambda: site.controller.activity == STATE.MOVING)
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.MOVE_ABSOLUTE, joint_positions=TARGET)
         await until(lambda: site.joints == pytest.approx(TARGET, abs=1e-6))
         await until(lambda: len(site.events("motion.foreign")) >= 1)
@@ -152,6 +152,7 @@ async def test_releasing_control_during_motion_stops_it(mesh, tmp_path):
         assert site.controller.stop.reason == "dead-man: li released control"
 
 
+@pytest.mark.exact_times
 async def test_one_operator_at_a_time_and_a_secret_alone_is_not_enough(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
         answer = await site.lease(A.ACQUIRE, ttl_s=60)
@@ -166,7 +167,7 @@ async def test_one_operator_at_a_time_and_a_secret_alone_is_not_enough(mesh, tmp
 
 async def test_a_command_is_executed_once_and_its_repeat_gets_the_first_answer(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         first = await site.command(C.SPEED, speed_percent=50, id=7)
         assert await site.command(C.SPEED, speed_percent=50, id=7) == first
         assert "id 6 is not higher than 7" in await refusal(site.command(C.HOME, id=6))
@@ -188,7 +189,7 @@ async def test_a_command_id_with_other_content_is_refused_and_audited(mesh, tmp_
             """Send a request like a plain Zenoh client; return the answer."""
             payload = json.dumps({"lease": site.secret, "id": 9, **fields})
             get = site.session.zenoh_session.get
-            replies = await asyncio.to_thread(lambda: list(get(key, payload=payload, timeout=5.0)))
+            replies = await asyncio.to_thread(lambda: list(get(key, payload=payload, timeout=40.0)))
             (reply,) = replies
             return (reply.ok or reply.err).payload.to_string()
 
@@ -223,7 +224,7 @@ async def test_a_command_id_with_other_content_is_refused_and_audited(mesh, tmp_
 async def test_a_refusal_gives_a_reason_and_sends_nothing(mesh, tmp_path):
     async with simulator(demo=True) as port, gateway(mesh, tmp_path, port) as site:
         assert "take control first" in await refusal(site.command(C.HOME))
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         beyond = [0, 0, 131 * 3.141592653589793 / 180, 0, 0]
         text = await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=beyond))
         assert text == "Not sent: joint elbow at 131.00° is beyond its limit 110.00°."
@@ -277,11 +278,11 @@ async def test_a_shutdown_stops_motion_and_a_start_restores_the_stop(mesh, tmp_p
 
 async def test_control_is_handed_over_and_taken_with_a_reason(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         assert "not offered to wang" in await refusal(site.lease(A.ACCEPT, operator="wang"))
         await site.lease(A.OFFER, to="wang")
         await until(lambda: site.seen["lease"][-1].offered_to == "wang")
-        await site.lease(A.ACCEPT, operator="wang", ttl_s=5)
+        await site.lease(A.ACCEPT, operator="wang")
         await site.command(C.TRACE_ON, operator="wang")
         assert "needs a reason" in await refusal(site.lease(A.TAKE))
         await site.lease(A.TAKE, reason="wang has gone home")
@@ -325,7 +326,7 @@ async def test_two_operators_never_both_get_control(mesh, tmp_path):
 async def test_the_speed_is_published_until_the_controller_may_have_lost_it(mesh, tmp_path):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
         assert not site.controller.HasField("speed_percent")
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.SPEED, speed_percent=30)
         await until(lambda: site.controller.speed_percent == 30)
         assert "outside 1 to 100 %" in await refusal(site.command(C.SPEED, speed_percent=0))

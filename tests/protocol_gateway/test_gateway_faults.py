@@ -16,7 +16,7 @@ from robomesh.contract.endpoints import router_config
 from robomesh.wire.session import SessionSettings
 from tests.conftest import last_value
 from tests.ports import free_port
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, simulator, until
+from tests.protocol_gateway.gateway_site import PROMPT, STATE, A, C, gateway, refusal, simulator, until
 
 FAR = [2.4, 0.2, -0.2, 0.1, 0.5]
 HOUSE = Path(__file__).resolve().parents[2]
@@ -48,7 +48,7 @@ async def simulator_process():
 
 
 async def test_a_frozen_controller_is_silent_and_old_states_keep_their_stamps(mesh, tmp_path):
-    async with simulator_process() as (process, port), gateway(mesh, tmp_path, port) as site:
+    async with simulator_process() as (process, port), gateway(mesh, tmp_path, port, **PROMPT) as site:
         process.send_signal(signal.SIGSTOP)
         await until(lambda: site.controller.link == STATE.SILENT)
         count, last = len(site.seen["joints"]), site.seen["joints"][-1]

@@ -299,7 +299,7 @@ async def test_without_an_allocated_file_motion_is_refused_and_stop_works(mesh, 
     latch.parent.mkdir(parents=True)
     latch.symlink_to(tmp_path / "gone" / "arm.latch")  # its disk is missing
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         assert await refusal(site.command(C.HOME)) == (
             "Not sent: the latch file arm.latch cannot be allocated (No such file or directory: "
             "check its disk), so a restart would forget a stop."
@@ -313,7 +313,7 @@ async def test_without_an_allocated_file_motion_is_refused_and_stop_works(mesh, 
         await until(lambda: site.controller.activity == STATE.STOPPED)
         latch.unlink()
         await until(lambda: site.events("audit.mended"))
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await site.command(C.RESET, stop_id=second.stop_id)
         await until(lambda: site.controller.activity == STATE.IDLE)
         await site.command(C.HOME)

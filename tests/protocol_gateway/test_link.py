@@ -164,7 +164,7 @@ async def test_a_silent_controller_is_reported_and_reconnected():
         arm_link.send(STOP)
         _, again = await arm.next()
         again.write(STATE)
-        await until(lambda: arm_link.status.state is LinkState.UP)
+        await until(lambda: seen.states.count(LinkState.UP) == 2)
         assert arm_link.counters.connections == 2
         assert LinkState.DOWN in seen.states
         await end(writer)
@@ -250,7 +250,7 @@ async def test_after_a_failed_send_the_link_reconnects_without_long_pauses():
         with pytest.raises(LinkDownError):
             arm_link.send(STOP)
         before, begin_s = tries, time.monotonic()
-        await until(lambda: tries >= before + 5, timeout_s=10.0)
+        await until(lambda: tries >= before + 5)
         assert time.monotonic() - begin_s > 0.5  # but not continuously
         refusing.cancel()
         reader, writer = await arm.next()
@@ -322,11 +322,12 @@ async def test_an_exception_in_a_callback_ends_the_link():
 async def test_the_rate_is_known_after_a_second_and_0_without_units():
     async with controller() as arm, link(arm.port) as (arm_link, _):
         _, writer = await arm.next()
-        begin = time.monotonic()
-        while time.monotonic() - begin < 1.5:
+        begin, count = time.monotonic(), 0
+        while count < 75 or not arm_link.rate_hz:
             writer.write(STATE)
+            count += 1
             await asyncio.sleep(0.02)
-        assert 20.0 < arm_link.rate_hz <= 50.0
+        assert 0.25 * count / (time.monotonic() - begin) < arm_link.rate_hz <= 50.0
         await end(writer)
         await until(lambda: arm_link.rate_hz == 0.0)
 
@@ -338,7 +339,7 @@ async def test_delayed_units_are_not_stamped_as_new():
     async with controller() as arm, link(arm.port, stale_after_s=0.4) as (arm_link, seen):
         _, writer = await arm.next()
         writer.write(unit_at(50.0))
-        await until(lambda: arm_link.status.state is LinkState.UP)
+        await until(lambda: LinkState.UP in seen.states)
         begin = seen.received[0]
         await until(lambda: arm_link.status.state is LinkState.SILENT)
         await asyncio.sleep(0.6)
@@ -348,7 +349,7 @@ async def test_delayed_units_are_not_stamped_as_new():
         assert seen.received[2].monotonic_s == pytest.approx(begin.monotonic_s + 0.2)
         assert seen.received[2].wall_ns == pytest.approx(begin.wall_ns + 2e8, abs=5e6)
         writer.write(unit_at(50.0 + time.monotonic() - begin.monotonic_s))
-        await until(lambda: arm_link.status.state is LinkState.UP)
+        await until(lambda: seen.states.count(LinkState.UP) == 2)
         await end(writer)
 
 
@@ -358,19 +359,22 @@ async def test_the_link_reports_round_trip_answers_and_losses():
 
     async with controller() as arm, link(arm.port) as (arm_link, seen):
         reader, writer = await arm.next()
+        begin_s = time.monotonic()
         for number in range(60):
             if number not in (20, 21):
                 writer.write(unit_at(50.0 + 0.01 * number, b"idle"))
                 await asyncio.sleep(0.005)
         await until(lambda: len(seen.events) >= 2 * 58)
         assert arm_link.counters.units_lost == 2
-        assert 0.0 < arm_link.health.network_round_trip_s < 1.0
-        assert 0.0 <= arm_link.health.jitter_s < 1.0
+        took_s = time.monotonic() - begin_s
+        assert 0.0 < arm_link.health.network_round_trip_s < took_s
+        assert 0.0 <= arm_link.health.jitter_s < took_s
         assert arm_link.health.answer_s is None
+        sent_s = time.monotonic()
         arm_link.send(STOP)
         await reader.readexactly(len(STOP))
         await asyncio.sleep(0.1)
         writer.write(unit_at(51.0, b"stopped"))
         await until(lambda: arm_link.health.answer_s is not None)
-        assert 0.1 <= arm_link.health.answer_s < 2.0
+        assert 0.1 <= arm_link.health.answer_s <= time.monotonic() - sent_s
         await end(writer)

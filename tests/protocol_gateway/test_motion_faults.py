@@ -17,7 +17,7 @@ async def test_uncommanded_motion_is_reported_and_ends_the_lease(mesh, tmp_path)
         port, say, _ = await stack.enter_async_context(scripted_controller())
         await stack.enter_async_context(repeated(say, lambda: f"1#ABSOLUTE.DEG*{waist};90;-90;0;0@"))
         site = await stack.enter_async_context(gateway(mesh, tmp_path, port))
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await asyncio.sleep(0.3)
         await until(lambda: site.seen["lease"][-1].holder == "li")
         waist = 5.0
@@ -43,20 +43,19 @@ async def test_a_robot_that_ignores_repeated_stops_is_a_critical_event(mesh, tmp
     async with scripted_controller() as (port, say, heard):
         status = "2#ABSOLUTE.DEG*1;90;-90;0;0&STATUS*moving;remote;homed@"
         async with repeated(say, lambda: status), gateway(mesh, tmp_path, port) as site:
-            began_s = time.monotonic()
             pressed = 0
-            while not site.events("stop.disobeyed"):
-                assert time.monotonic() - began_s < 20.0
+            while not (disobeyed := site.events("stop.disobeyed")):
                 await site.stop()
                 pressed += 1
                 await asyncio.sleep(0.3)
-            assert (await site.event("stop.disobeyed", 0)).severity == schema.Event.CRITICAL
-            await until(lambda: heard.count(b"stop") == pressed + 1)
+            assert disobeyed[0].severity == schema.Event.CRITICAL
+            # Each time, the gateway repeats its stop.
+            await until(lambda: heard.count(b"stop") == pressed + len(site.events("stop.disobeyed")))
 
 
 async def test_a_motion_that_begins_late_stays_under_its_lease_and_is_stopped_with_it(mesh, tmp_path):
     async with slow_starter(2.6) as (port, heard), gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
         await until(lambda: site.controller.activity == STATE.MOVING)
         await until(lambda: site.seen["lease"][-1].motion)
@@ -67,7 +66,7 @@ async def test_a_motion_that_begins_late_stays_under_its_lease_and_is_stopped_wi
 
 async def test_a_lease_that_ends_before_its_motion_has_begun_stops_the_robot(mesh, tmp_path):
     async with slow_starter(60.0) as (port, heard), gateway(mesh, tmp_path, port) as site:
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
         await asyncio.sleep(2.2)
         await site.lease(A.RELEASE)
@@ -80,7 +79,7 @@ async def test_a_motion_that_the_controller_refuses_is_over_at_once(mesh, tmp_pa
         repeated(say, lambda: "2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*idle;remote;homed@"),
         gateway(mesh, tmp_path, port) as site,
     ):
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
         await until(lambda: site.seen["lease"][-1].motion)
         say("1#ERROR*5;no@")
@@ -96,7 +95,7 @@ async def test_a_refusal_of_an_earlier_unit_does_not_end_the_motion(mesh, tmp_pa
         repeated(say, lambda: "2#ABSOLUTE.DEG*0;0;0;0;0&STATUS*idle;remote;homed@"),
         gateway(mesh, tmp_path, port) as site,
     ):
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.SPEED, speed_percent=50)
         await site.command(C.MOVE_ABSOLUTE, joint_positions=[1.0, 0, 0, 0, 0])
         say("1#ERROR*5;speed@")
@@ -116,7 +115,7 @@ async def test_a_stop_is_not_reset_during_motion_and_the_dead_man_stays(mesh, tm
         repeated(say, state),
         gateway(mesh, tmp_path, port) as site,
     ):
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await until(lambda: site.controller.activity == STATE.MOVING)
         stop_id = (await site.stop()).stop_id
         text = await refusal(site.command(C.RESET, stop_id=stop_id))
@@ -142,7 +141,7 @@ async def test_after_a_reset_the_old_stop_is_ignored_briefly_but_not_a_new_fault
         repeated(say, state),
         gateway(mesh, tmp_path, port) as site,
     ):
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await site.command(C.RESET)
         await site.command(C.HOME)
         await site.command(C.RESET)

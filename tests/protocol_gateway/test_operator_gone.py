@@ -88,7 +88,7 @@ async def test_a_link_lost_at_rest_keeps_the_lease(mesh, tmp_path):
         first = await stack.enter_async_context(contextlib.AsyncExitStack())
         port = await first.enter_async_context(simulator())
         site = await stack.enter_async_context(gateway(mesh, tmp_path, port))
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         await first.aclose()
         await until(lambda: site.controller.link == STATE.DOWN)
         await stack.enter_async_context(simulator(listen=f"127.0.0.1:{port}"))

@@ -11,7 +11,7 @@ from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
 
 async def held_code(site, command, **values):
     """Return the reason of a refusal; acquire the lease again if it expired on a busy machine."""
-    await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)
+    await site.lease(A.ACQUIRE, lease=site.secret)
     return await code(site.command(command, **values))
 
 
@@ -29,7 +29,7 @@ async def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_pa
         assert (await code(site.command(C.HOME))).code == "lease.none"
         assert (await code(site.lease(A.RENEW))).code == "lease.none"
         await site.home()
-        await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)
+        await site.lease(A.ACQUIRE, lease=site.secret)
         found = await code(site.lease(A.ACQUIRE, operator="wang"))
         assert (found.code, found.values) == ("lease.held", {"holder": "li"})
 
@@ -45,7 +45,7 @@ async def test_reply_audit_entry_event_and_state_have_the_same_code(mesh, tmp_pa
         found = await held_code(site, C.HOME)
         assert (found.code, found.values["reason"]) == ("stop.latched", "smoke")
 
-        await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)
+        await site.lease(A.ACQUIRE, lease=site.secret)
         await site.lease(A.RELEASE, reason="lunch")
         ended = await until(lambda: site.seen["lease"][-1].ended_reason.code and site.seen["lease"][-1])
         assert ended.ended_reason.code == "lease.ended.released_why"

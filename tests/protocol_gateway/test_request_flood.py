@@ -21,7 +21,7 @@ async def test_in_a_flood_of_requests_a_stop_works_and_all_are_counted(mesh, tmp
     ):
         await site.home()
         await site.command(C.MOVE_ABSOLUTE, joint_positions=FAR)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         guess = schema.CommandRequest(lease="guess", id=1, command=C.HOME)
         flood = [
             asyncio.create_task(

@@ -27,7 +27,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robots.kinematics.joints import JointType
 from services.errors import SiteFileError
 from services.site_file.site import load
-from tests.protocol_gateway.gateway_site import STATE, A, C, gateway, refusal, until
+from tests.protocol_gateway.gateway_site import PROMPT, STATE, A, C, gateway, refusal, until
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "driver"
 ENTRY_POINTS = "[robomesh.drivers]\njson-lines = json_lines:JsonLines\nbroken = no_such_module:Driver\n"
@@ -86,7 +86,7 @@ async def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_a
 ):
     async with (
         json_controller() as (port, heard, state),
-        gateway(mesh, tmp_path, port, protocol="json-lines") as site,
+        gateway(mesh, tmp_path, port, protocol="json-lines", **PROMPT) as site,
     ):
         await until(lambda: site.joints == [0.1] * 5)
         # Positions and state are two topics.
@@ -95,17 +95,16 @@ async def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_a
         able = site.controller.capabilities
         assert able.stops == schema.Capabilities.ANY
         assert set(able.commands) == {C.HOME, C.RESET, C.MOVE_ABSOLUTE, C.MOVE_RELATIVE, C.RUN_PROGRAM}
-        await site.lease(A.ACQUIRE, ttl_s=5)
+        await site.lease(A.ACQUIRE)
         target = [0.2, 0.3, -0.1, 0.1, 0.3]
         await site.command(C.MOVE_ABSOLUTE, joint_positions=target)
         await until(lambda: site.joints == target)
-        await site.lease(A.ACQUIRE, lease=site.secret, ttl_s=5)  # a busy machine may have taken over 5 s
         assert "this controller has no TRACE_ON" in await refusal(site.command(C.TRACE_ON))
         far = [math.radians(170.0), *target[1:]]
         assert "waist" in await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=far))
         stop = await site.stop(by="wang")
         await until(lambda: site.controller.activity == STATE.STOPPED)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await site.command(C.RESET, stop_id=stop.stop_id)
         await until(lambda: heard[-1] == "reset")
         state["q"] = [0.0] * 3

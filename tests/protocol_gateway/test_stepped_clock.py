@@ -8,7 +8,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from protocol_gateway.execution import clocks
 from robomesh.errors import RefusedError
-from tests.protocol_gateway.gateway_site import A, C, gateway, simulator, until
+from tests.protocol_gateway.gateway_site import LEASE_S, A, C, gateway, simulator, until
 
 HOUR_NS = 3600 * 10**9
 
@@ -25,7 +25,7 @@ def system_clock(monkeypatch):
 @pytest.mark.parametrize("set_by_ns", [-HOUR_NS, HOUR_NS])
 async def test_no_step_of_the_systems_clock_moves_a_deadline(mesh, tmp_path, system_clock, set_by_ns):
     async with simulator() as port, gateway(mesh, tmp_path, port) as site:
-        answer = await site.lease(A.ACQUIRE, ttl_s=5)
+        answer = await site.lease(A.ACQUIRE)
         gateway_minus_monotonic_ns = answer.now.ToNanoseconds() - time.monotonic_ns()
 
         async def speed(number, after_s):
@@ -43,8 +43,8 @@ async def test_no_step_of_the_systems_clock_moves_a_deadline(mesh, tmp_path, sys
         assert await speed(1, -0.5) == "command.late"
         assert await speed(2, 3600) == "command.deadline_far"
         assert await speed(3, 4) == "done"
-        again = await site.lease(A.RENEW, ttl_s=5)
-        assert 0 < again.until.ToNanoseconds() - again.now.ToNanoseconds() <= 5 * 10**9
+        again = await site.lease(A.RENEW)
+        assert 0 < again.until.ToNanoseconds() - again.now.ToNanoseconds() <= LEASE_S * 1e9
         assert 0 < again.now.ToNanoseconds() - answer.now.ToNanoseconds() < 60 * 10**9
         # The page compares them: a lease published later is later.
         await until(lambda: site.seen["lease"][-1].timestamp.ToNanoseconds() > again.now.ToNanoseconds())

@@ -26,7 +26,7 @@ BESIDE = View(
 
 
 async def ask(monitor, asker="li", **fields):
-    answer = await monitor.ask(f"{ARM}/views/{asker}", ViewRequest(**fields), timeout_s=5.0)
+    answer = await monitor.ask(f"{ARM}/views/{asker}", ViewRequest(**fields), timeout_s=40.0)
     assert isinstance(answer, ViewAnswer)
     return answer
 

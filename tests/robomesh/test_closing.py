@@ -14,7 +14,7 @@ async def test_subscription_closed_before_its_first_read_ends_without_error(mesh
     read, begin = Subscription._read, threading.Event()
 
     def late(subscription):
-        begin.wait(10.0)
+        begin.wait(60.0)
         read(subscription)
 
     monkeypatch.setattr(Subscription, "_read", late)

@@ -23,7 +23,7 @@ def test_answers_run_in_order_on_one_thread(answering):
     for number in range(10):
         answering.add(lambda number=number: ran.append((number, threading.get_ident())))
     answering.add(ended.set)
-    assert ended.wait(10.0)
+    assert ended.wait(60.0)
     assert [number for number, _ in ran] == [*range(10)]
     assert len({thread for _, thread in ran} - {threading.get_ident()}) == 1
 
@@ -37,7 +37,7 @@ def test_an_answer_that_fails_does_not_end_the_thread(answering, caplog):
     answering.add(lambda: fail(zenoh.ZError("the session is closed")))
     answering.add(lambda: fail(ValueError("broken")))
     answering.add(ended.set)
-    assert ended.wait(10.0)
+    assert ended.wait(60.0)
     assert "broken" in caplog.text
     assert "the session is closed" not in caplog.text
 
@@ -47,7 +47,7 @@ def test_a_flood_waits_at_its_sender(answering):
 
     def flood():
         for number in range(_MOST_WAITING + 50):
-            answering.add(lambda: go.wait(10.0))
+            answering.add(lambda: go.wait(60.0))
             added.append(number)
 
     flooding = threading.Thread(target=flood)
@@ -56,7 +56,7 @@ def test_a_flood_waits_at_its_sender(answering):
     assert flooding.is_alive()
     assert len(added) <= _MOST_WAITING + 1
     go.set()
-    flooding.join(10.0)
+    flooding.join(60.0)
     assert len(added) == _MOST_WAITING + 50
 
 

@@ -91,7 +91,7 @@ async def refusals(session, error):
     server = session.answer("site", "arm", "stop", refuse)
     try:
         with pytest.raises(RefusedError) as refused:
-            await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=5)
+            await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=40)
     finally:
         server.close()
     return refused.value
@@ -125,7 +125,7 @@ async def test_older_client_gets_the_encodings_that_it_knows(mesh):
         return [
             (str(reply.err.encoding), reply.err.payload.to_string())
             for _ in range(3)
-            for reply in plain.get("robomesh/site/arm/stop", timeout=5.0)
+            for reply in plain.get("robomesh/site/arm/stop", timeout=40.0)
         ]
 
     async with open_session(mesh) as session:

@@ -174,7 +174,7 @@ async def test_the_last_list_is_returned_although_messages_follow_it(mesh):
 
         task = asyncio.create_task(flood())
         for _ in range(10):
-            history = await monitor.last("robomesh/site/arm/events", timeout_s=10.0)
+            history = await monitor.last("robomesh/site/arm/events", timeout_s=40.0)
             assert history is not None
         task.cancel()
 

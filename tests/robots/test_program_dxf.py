@@ -1,6 +1,5 @@
 """Drawings as programs: the drawn points, placed by the frame."""
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -241,10 +240,8 @@ def test_blocks_that_cannot_be_expanded_are_refused_at_once(
     tmp_path: Path, fill: Callable[[Drawing], object], sentence: str
 ) -> None:
     path = blocks(tmp_path, fill)
-    start = time.monotonic()
     with pytest.raises(ShapeError, match=sentence):
         program_from_dxf(path, DxfPath())
-    assert time.monotonic() - start < 2
 
 
 @pytest.mark.parametrize("content", [b"", b"solid a", b"0\nSECTION\n2\nENTITIES\n0\nLINE\n"])

@@ -76,7 +76,7 @@ class Page:
                 else:
                     self.other.append(message)
 
-    async def ask(self, number, key, request=b"", timeout_s=10.0):
+    async def ask(self, number, key, request=b"", timeout_s=30.0):
         await self.send(ask={"id": number, "key": key, "payload": request, "timeout_s": timeout_s})
         await self.until(lambda: any(m.answer.id == number for m in self.other))
         return next(m.answer for m in self.other if m.answer.id == number)

@@ -51,7 +51,7 @@ async def hello(browser):
     return browser.other[0].hello
 
 
-async def closing(browser, timeout_s=10.0):
+async def closing(browser, timeout_s=40.0):
     """Return the code and the reason of the close frame."""
     async with asyncio.timeout(timeout_s):
         try:
@@ -198,10 +198,10 @@ async def test_a_download_ends_with_its_session(mesh, page, tmp_path):
         other.answer("s", "r", "mesh/*", shape_of_link)
         await client.sign_in("li")
         fetched = asyncio.create_task(fetch(client, "/mesh/s/r/base"))
-        async with asyncio.timeout(10.0):
+        async with asyncio.timeout(40.0):
             await begun.wait()
         await client.post("/account/sign-out")
-        async with asyncio.timeout(10.0):
+        async with asyncio.timeout(40.0):
             assert b"glTF" not in await fetched
         go_on.set()
 
@@ -263,11 +263,10 @@ async def test_a_lesser_role_holds_at_once_and_takes_control_away(mesh, page, tm
                 lambda: any(
                     m.WhichOneof("message") == "hello" and not m.hello.may_command for m in browser.other
                 ),
-                10.0,
             )
             answer = await browser.ask(2, f"{LEASE}/li.s", lease(ACTION.RENEW))
             assert "li is a monitor" in answer.error
-            async with asyncio.timeout(5.0):
+            async with asyncio.timeout(40.0):
                 while (await other.present_sessions())[0]:
                     await asyncio.sleep(0.01)
             # The gateway learns why, for every page.
@@ -283,7 +282,7 @@ async def test_control_of_a_session_that_ends_is_released_with_the_cause(mesh, p
             assert (await browser.ask(1, f"{LEASE}/li.s", lease())).ok
             change_account(path, "disable", "li")
             assert await closing(browser) == (SIGNED_OUT, "disabled")
-            async with asyncio.timeout(10.0):
+            async with asyncio.timeout(40.0):
                 while (await other.present_sessions())[0]:
                     await asyncio.sleep(0.01)
         assert released(asked) == [("secret", schema.LeaseRequest.SIGNED_OUT)]
@@ -301,7 +300,7 @@ async def test_an_invalid_accounts_file_is_reported_and_keeps_sessions(mesh, pag
         await client.sign_in("li")
         path.write_text("[[account")
         codes = []
-        async with asyncio.timeout(10.0):
+        async with asyncio.timeout(40.0):
             async for sample in events:
                 message = sample.message()
                 reported = getattr(message, "events", [message])
@@ -320,7 +319,7 @@ async def test_signing_in_and_out_and_refusals_are_events_without_secrets(mesh, 
         token = client.cookie.partition("=")[2]
         await client.post("/account/sign-out")
         published = {}
-        async with asyncio.timeout(10.0):
+        async with asyncio.timeout(40.0):
             async for sample in events:
                 message = sample.message()
                 for event in getattr(message, "events", [message]):

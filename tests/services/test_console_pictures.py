@@ -117,7 +117,7 @@ async def rendered(mesh, page, **settings):  # noqa: F811
         yield address, renderer
 
 
-async def stream(address, path, *, until_bytes, method="GET", timeout_s=15.0):
+async def stream(address, path, *, until_bytes, method="GET", timeout_s=40.0):
     """Return status, headers, the beginning of a stream's body, and functions to read on and to end it."""
     host, port = address.split(":")
     reader, writer = await asyncio.open_connection(host, int(port))
@@ -137,7 +137,7 @@ async def pieces_of(reader, until_bytes):
     return body
 
 
-async def unwatched(publishers, timeout_s=10.0):
+async def unwatched(publishers, timeout_s=40.0):
     async with asyncio.timeout(timeout_s):
         while any(publisher.watched for publisher in publishers):
             await asyncio.sleep(0.02)

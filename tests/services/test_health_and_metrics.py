@@ -36,7 +36,7 @@ async def scraped(url: str) -> dict[str, dict[tuple[tuple[str, str], ...], float
 
 def scrape(url: str) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
     """Return samples as `scraped`; blocks."""
-    with urllib.request.urlopen(url, timeout=10.0) as answer:
+    with urllib.request.urlopen(url, timeout=40.0) as answer:
         text = answer.read().decode()
     found: dict[str, dict[tuple[tuple[str, str], ...], float]] = {}
     for family in text_string_to_metric_families(text):
@@ -170,7 +170,7 @@ async def test_only_the_process_that_is_asked_answers_for_its_clock(mesh):
     async with open_session(mesh) as one, open_session(mesh) as other, open_session(mesh) as asker:
         async with present(one, GATEWAY), present(other, GATEWAY):
             for each in (one, other):
-                reading = await read_clock(asker, "s", each.identity, hops=True, timeout_s=10.0)
+                reading = await read_clock(asker, "s", each.identity, hops=True, timeout_s=40.0)
                 assert abs(reading.offset_s) <= reading.round_trip_s / 2 + 1e-3
                 # To the router, and from it to the process.
                 assert len(reading.hops) == 2

@@ -102,7 +102,7 @@ async def test_the_description_lists_the_cells_fixtures_and_their_shapes_are_ser
             assert (fixture.name, fixture.color, description.cell) == ("post", "#c9a227", "a")
             assert fixture.fixture_to_site == at(0.6, 0.0, 0.5).ravel().tolist()
             assert (description.warning_distance, description.stop_distance) == (0.05, 0.01)
-            glb = await monitor.ask_bytes(f"robomesh/hall/{robot}/mesh/{fixture.mesh}", timeout_s=10.0)
+            glb = await monitor.ask_bytes(f"robomesh/hall/{robot}/mesh/{fixture.mesh}", timeout_s=40.0)
             assert glb.startswith(b"glTF")
 
 

@@ -46,7 +46,7 @@ def folder(tmp_path):
 
 
 async def opened(monitor, **values):
-    return await monitor.ask(OPEN, schema.PlayRequest(file="trial.mcap", **values), timeout_s=10.0)
+    return await monitor.ask(OPEN, schema.PlayRequest(file="trial.mcap", **values), timeout_s=40.0)
 
 
 async def ask(monitor, state, action, **values):
@@ -94,7 +94,7 @@ async def test_a_recorders_file_is_replayed_unchanged(mesh, tmp_path):
         recording = asyncio.create_task(recorder.serve(service, settings))
         key = "robomesh/site/arm/recorder/request"
         publisher = session.declare_publisher("site", "arm", "joints")
-        await session.ask(key, _Record(action=_Record.TRACE_ON, name="real", views=["-"]), timeout_s=15.0)
+        await session.ask(key, _Record(action=_Record.TRACE_ON, name="real", views=["-"]), timeout_s=40.0)
         while not publisher.watched:
             await asyncio.sleep(0.01)
         put = {}
@@ -102,10 +102,10 @@ async def test_a_recorders_file_is_replayed_unchanged(mesh, tmp_path):
             header = publisher.put(joints(waist=number / 7))
             put[header.source_time_ns] = number / 7
             await asyncio.sleep(0.01)
-        done = await session.ask(key, _Record(action=_Record.TRACE_OFF), timeout_s=15.0)
+        done = await session.ask(key, _Record(action=_Record.TRACE_OFF), timeout_s=40.0)
         # In a loop, because a player that is late on a busy machine skips messages.
         request = schema.PlayRequest(file=done.file, paused=True, loop=True)
-        state = await session.ask(OPEN, request, timeout_s=10.0)
+        state = await session.ask(OPEN, request, timeout_s=40.0)
         seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=1000)
         await ask(session, state, _Ask.PLAY)
         played = {}
@@ -280,7 +280,7 @@ async def test_a_file_that_cannot_be_played_is_refused(mesh, folder):
     (folder / "arm" / "text.mcap").write_text("no recording")
 
     async def play(session, file, **values):
-        await session.ask(OPEN, schema.PlayRequest(file=file, **values), timeout_s=10.0)
+        await session.ask(OPEN, schema.PlayRequest(file=file, **values), timeout_s=40.0)
 
     async with playing_site(mesh, folder) as session:
         for name in ("gone.mcap", "../arm/trial.mcap"):

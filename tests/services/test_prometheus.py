@@ -150,7 +150,7 @@ def test_dashboard_and_rules_ask_for_metrics_and_labels_that_the_services_have(s
 
     def read() -> bool:
         for address in addresses(site).values():
-            with urllib.request.urlopen(f"http://{address}/metrics", timeout=10.0) as answer:
+            with urllib.request.urlopen(f"http://{address}/metrics", timeout=40.0) as answer:
                 for family in text_string_to_metric_families(answer.read().decode()):
                     for sample in family.samples:
                         labels.setdefault(sample.name, set()).update(sample.labels)
@@ -211,7 +211,7 @@ def asked(url: str, query: str) -> list[tuple[dict[str, str], float]]:
     """Return labels and value of each series of a query; empty while Prometheus starts."""
     request = f"{url}/api/v1/query?{urllib.parse.urlencode({'query': query})}"
     try:
-        with urllib.request.urlopen(request, timeout=10.0) as answer:
+        with urllib.request.urlopen(request, timeout=40.0) as answer:
             found = json.load(answer)["data"]["result"]
     except urllib.error.HTTPError as error:
         if error.code == 503:

@@ -109,11 +109,11 @@ async def test_a_gateway_of_another_site_neither_answers_nor_shows_itself_for_ou
 
             await until(crossed)
             for key in keys:
-                answers = [each.ok for each in li.get(key, target=zenoh.QueryTarget.ALL, timeout=5.0)]
+                answers = [each.ok for each in li.get(key, target=zenoh.QueryTarget.ALL, timeout=40.0)]
                 assert len(answers) == 1
             assert (own, foreign) == (keys, [])
             assert not [key for key, _ in heard if key.startswith("robomesh/here/")]
-            tokens = li.liveliness().get(f"{token}*", timeout=5.0)
+            tokens = li.liveliness().get(f"{token}*", timeout=40.0)
             assert [str(each.ok.key_expr) for each in tokens] == [f"{token}own"]
 
 

@@ -133,7 +133,7 @@ def test_a_blocked_terminal_does_not_block_a_service():
     )
     try:
         assert process.stdout.readline().strip()
-        process.wait(10.0)
+        process.wait(60.0)
     finally:
         process.kill()
         process.communicate()

@@ -61,7 +61,7 @@ class WatchClient:
 
     async def ask(self, by="li.s", **request):
         answer = await self.session.ask(
-            f"robomesh/s/-/alarms/request/{by}", Request(**request), timeout_s=10.0
+            f"robomesh/s/-/alarms/request/{by}", Request(**request), timeout_s=40.0
         )
         return {each.id: each for each in answer.alarms}
 

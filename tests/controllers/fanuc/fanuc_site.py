@@ -37,7 +37,7 @@ async def movable(mesh, folder, at, *, motion=MOVES, session=None, **robot):
 async def in_control(site):
     """Wait until the state is known, take control, and wait until RMI is connected."""
     await remote(site)
-    await site.lease(A.ACQUIRE, ttl_s=5)
+    await site.lease(A.ACQUIRE)
     await until(lambda: site.controller.capabilities.stops == site.controller.capabilities.OURS)
 
 

@@ -85,7 +85,7 @@ async def test_without_motion_in_the_site_file_rmi_is_never_connected(mesh, tmp_
     ):
         await until(lambda: site.joints)
         assert not (await site.stop(by="wang")).sent
-        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE))
         await site.units(20)
         assert not server.received
         assert server.session is None

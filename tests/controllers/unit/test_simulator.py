@@ -80,13 +80,12 @@ async def client(port):
 
 
 async def test_states_arrive_at_the_rate_with_a_running_clock():
+    begin_s = time.monotonic()
     async with simulator() as port, client(port) as one:
         first = await one.state(lambda *records: True)
-        begin_s = time.monotonic()
         for _ in range(100):
             last = await one.state(lambda *records: True)
-        assert time.monotonic() - begin_s > 0.9
-        assert last[3].seconds - first[3].seconds == pytest.approx(time.monotonic() - begin_s, abs=0.2)
+        assert 0.9 < last[3].seconds - first[3].seconds < time.monotonic() - begin_s
 
 
 async def test_every_client_sees_the_motion_that_one_of_them_commanded():
@@ -137,16 +136,20 @@ async def test_a_client_that_disconnects_makes_room_for_another():
 @pytest.mark.slow
 async def test_a_client_that_does_not_read_delays_no_other_and_is_closed():
     async with simulator(rate_hz=1000.0) as port, client(port) as quick:
+
+        async def rate_hz(seconds):
+            begin_s, count = time.monotonic(), 0
+            while (took_s := time.monotonic() - begin_s) < seconds:
+                await quick.state(lambda *records: True)
+                count += 1
+            return count / took_s
+
+        alone_hz = await rate_hz(2.0)
         with socket.socket() as slow:
             slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             slow.connect(("127.0.0.1", port))
-            begin_s = time.monotonic()
-            worst_s, last_s = 0.0, begin_s
-            while time.monotonic() - begin_s < 6.5:
-                await quick.state(lambda *records: True)
-                worst_s = max(worst_s, time.monotonic() - last_s)
-                last_s = time.monotonic()
-            assert worst_s < 0.5
+            # A client that does not read is closed after 5 s; until then, the other one would get nothing.
+            assert await rate_hz(6.5) > 0.4 * alone_hz
             # Closed while unread data is still in its buffers.
             slow.settimeout(30.0)
             with contextlib.suppress(ConnectionError):
@@ -157,7 +160,7 @@ async def test_a_client_that_does_not_read_delays_no_other_and_is_closed():
 async def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
     def connect_and_disconnect(port):
         for number in range(25):
-            with socket.create_connection(("127.0.0.1", port), timeout=5) as one:
+            with socket.create_connection(("127.0.0.1", port), timeout=60) as one:
                 end = time.monotonic() + 0.05 + number % 7 * 0.01
                 while time.monotonic() < end:
                     assert one.recv(65536)
@@ -172,9 +175,16 @@ async def test_clients_that_disconnect_during_a_flood_cause_no_error(caplog):
 
 async def test_freeze_sends_nothing_and_keeps_the_socket_open():
     async with simulator(faults=("freeze@0.3",)) as port, client(port) as one:
-        await one.state(lambda *records: True)
+        units = 0
+
+        async def count_until_silence():
+            nonlocal units
+            while units < 1000:
+                await asyncio.wait_for(one.next(lambda event: True), 1.5)
+                units += 1
+
         with pytest.raises(TimeoutError):
-            await asyncio.wait_for(one.next(lambda event: False), 1.5)
+            await count_until_silence()
         one.send(b"1#COMMAND*stop@")
 
 

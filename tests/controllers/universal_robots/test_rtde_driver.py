@@ -346,7 +346,7 @@ async def test_a_controller_with_rtde_is_shown_and_never_commanded(mesh, tmp_pat
         assert len(last.joints) == 6
         assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
         greeting = relay.data
-        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE))
         assert "Not sent" in await refusal(site.command(C.HOME))
         # A stop is asked for, and is not sent: the answer says so.
         answer = await site.stop(by="wang")

@@ -95,13 +95,13 @@ async def test_a_changed_payload_is_confirmed_with_a_reason_by_an_operator_who_h
         server.controller.payload_kg = 4.0
         await until(lambda: "payload.mass" in site.controller.check_text)
         assert schema.Recover.CONFIRM_TOOL in site.controller.capabilities.recoveries
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         for wrong in ({"reason": ""}, {"looked": False}):
             assert "Not sent" in await refusal(site.command(C.RECOVER, **confirmation(**wrong)))
         async with asyncio.timeout(30.0):
             # The arm must be seen to rest.
             while "moves" in await answer_of(site.command(C.RECOVER, **confirmation())):
-                await site.lease(A.RENEW, ttl_s=5)
+                await site.lease(A.RENEW)
         await until(lambda: not site.controller.check_text)
         event = await site.event("recover.confirmed", -1)
         assert re.fullmatch(r"li has confirmed payload.mass .* → 4: new gripper", event.text)
@@ -124,7 +124,7 @@ async def test_other_software_is_refused(mesh, tmp_path, monkeypatch, version):
         await until(lambda: site.controller.read_only)
         can = site.controller.capabilities
         assert (can.stops, [*can.commands], [*can.recoveries]) == (can.NONE, [], [])
-        assert "PolyScope 5.6" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "PolyScope 5.6" in await refusal(site.lease(A.ACQUIRE))
         # The dashboard is given back, and a connection for inputs is not opened.
         await until(lambda: not server._dashboards)
         await site.units(50)
@@ -147,4 +147,4 @@ async def test_without_motion_in_the_site_file_no_other_connection_is_opened(mes
         assert gate.data == greeting
         assert not server._dashboards
         assert len(server._monitors) == 1
-        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE))

@@ -53,7 +53,7 @@ async def refused(awaitable):
 
 async def in_state(site, activity):
     await until(lambda: site.controller.activity == activity)
-    await site.lease(A.RENEW, ttl_s=5)
+    await site.lease(A.RENEW)
 
 
 def said(gate):
@@ -97,7 +97,7 @@ async def test_a_protective_stop_is_unlocked_once_and_nothing_else_changes(mesh,
         answer = await site.stop(by="wang")
         assert set(said(gate)) == {"stop"}
         await until(lambda: time.monotonic() > begin_s + 0.7)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         rest = server.controller.programs.arm(time.monotonic()).positions
         text = (await recover(site, R.UNLOCK_PROTECTIVE_STOP)).text
         assert text.startswith("unlock_protective_stop is on the controller's socket; the robot's state")
@@ -136,7 +136,7 @@ async def test_an_arm_without_power_gets_it_and_its_brakes_are_released_one_by_o
 
         # The gateway sees the new mode a state later.
         await site.units(3)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await recover(site, R.BRAKE_RELEASE)
         await in_state(site, STATE.IDLE)
         assert said(gate) == ["power on", "brake release"]
@@ -162,7 +162,7 @@ async def test_a_program_of_others_must_end_first(mesh, tmp_path, monkeypatch):
 
         # Until the arm is seen to rest.
         while (found := await code()) == "recover.moves":
-            await site.lease(A.RENEW, ttl_s=5)
+            await site.lease(A.RENEW)
         assert found == "universal_robots.other_program"
         assert server.controller.safety_mode is SafetyMode.PROTECTIVE_STOP
 

@@ -36,7 +36,7 @@ async def movable(mesh, folder, at, *, motion=None, **robot):
 async def in_control(site):
     """Wait until the robot can be moved, and take control."""
     await remote(site)
-    await site.lease(A.ACQUIRE, ttl_s=5)
+    await site.lease(A.ACQUIRE)
 
 
 def runs(server):

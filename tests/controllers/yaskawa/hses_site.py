@@ -57,4 +57,4 @@ async def in_control(site):
     await until(lambda: site.controller.capabilities.stops != site.controller.capabilities.NOT_NOW)
     # The axes of robot and base are asked for by then.
     await site.units(20)
-    await site.lease(A.ACQUIRE, ttl_s=5)
+    await site.lease(A.ACQUIRE)

@@ -441,7 +441,7 @@ async def test_a_controller_with_hses_is_shown_and_only_reads_are_sent(mesh, tmp
         await site.units(50)
         first, last = (site.seen["joints"][at] for at in (0, -1))
         assert [joint.position for joint in first.joints] != [joint.position for joint in last.joints]
-        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE, ttl_s=5))
+        assert "does not let the gateway move it" in await refusal(site.lease(A.ACQUIRE))
         assert "Not sent" in await refusal(site.command(C.HOME))
         answer = await site.stop(by="wang")
         assert not answer.sent

@@ -56,7 +56,7 @@ def moves(server):
 async def until_reset(site, server):
     """Reset the stop over a held motion, as the manual says: without servos."""
     await until(lambda: site.controller.activity == STATE.HOLDING)
-    await site.lease(A.RENEW, ttl_s=5)
+    await site.lease(A.RENEW)
     reset = {"stop_id": site.controller.stop.id}
     async with asyncio.timeout(30.0):
         # Until the status is newer than HOLD.
@@ -65,7 +65,7 @@ async def until_reset(site, server):
     server.controller.switch_servos(False, time.monotonic())
     async with asyncio.timeout(30.0):
         while site.controller.HasField("stop"):
-            await site.lease(A.RENEW, ttl_s=5)
+            await site.lease(A.RENEW)
             with contextlib.suppress(RefusedError):
                 await site.command(C.RESET, **reset)
             await asyncio.sleep(0.05)
@@ -118,7 +118,7 @@ async def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, 
         await site.units(20)
         assert positions(server) == pytest.approx(rest)
         assert written(relay).count(HOLD_OFF) == 1
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await move(site, -0.2)
         await moving(site)
         await resting(site)
@@ -126,7 +126,7 @@ async def test_a_stop_holds_and_nothing_goes_on_after_its_reset(mesh, tmp_path, 
         # At rest nothing is held back, so the servos stay on.
         await site.stop(by="wang")
         await until(lambda: site.controller.activity == STATE.HOLDING)
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await site.command(C.RESET, stop_id=site.controller.stop.id)
         await resting(site)
         assert len(motions(relay)) == server.controller.commands == 2
@@ -187,7 +187,7 @@ async def test_a_refused_motion_is_over_and_its_refusal_is_shown(mesh, tmp_path,
         await resting(site)
         assert not site.controller.HasField("stop")
         monkeypatch.undo()
-        await site.lease(A.RENEW, ttl_s=5)
+        await site.lease(A.RENEW)
         await move(site, 0.1)
         await moving(site)
         await resting(site)
@@ -219,7 +219,7 @@ async def test_a_motion_is_refused_in_words(mesh, tmp_path, monkeypatch):
         ):
             begin()
             await site.units(20)
-            await site.lease(A.RENEW, ttl_s=5)
+            await site.lease(A.RENEW)
             assert text in (await refusal(move(site, 0.1))).lower()
             end()
             await resting(site)

@@ -47,7 +47,7 @@ class Client(asyncio.DatagramProtocol):
         self.number = (self.number + 1) % 256
         self.transport.sendto(read.encode(self.number))
 
-    async def ask(self, read, within_s=10.0):
+    async def ask(self, read, within_s=60.0):
         """Return the answer to a question, which is repeated until it comes."""
         async with asyncio.timeout(within_s):
             while True:
