@@ -11,14 +11,9 @@ from web import build_page
 
 @pytest.fixture(scope="package")
 def plant(tmp_path_factory):
-    """Yield a site of real processes: its page, the folder of its robots, the store of Define's files."""
+    """Yield a site of real processes: its page, and the folder of its robots."""
     build_page.build()
-    cache = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(os.environ, "XDG_CACHE_HOME", str(cache))
+        patch.setitem(os.environ, "XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         with running_site(tmp_path_factory.mktemp("site"), robots="", services=()) as site:
-            yield SimpleNamespace(
-                address=site.console.rstrip("/"),
-                robots=site.folder / "robots",
-                store=cache / "robomesh" / "define",
-            )
+            yield SimpleNamespace(address=site.console.rstrip("/"), robots=site.folder / "robots")

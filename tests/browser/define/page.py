@@ -1,7 +1,6 @@
 """Actions on Define's page."""
 
 import base64
-import contextlib
 import json
 import re
 
@@ -94,16 +93,6 @@ def save_state(page):
     return page.get_by_role("toolbar").get_by_role("status")
 
 
-def done(page):
-    """Return what an action has done."""
-    return page.get_by_role("status", name="Outcome", exact=True)
-
-
-def refusal(page):
-    """Return why an action was refused."""
-    return page.get_by_role("alert", name=re.compile("^(Outcome|结果)$"))
-
-
 def missing_files(page):
     return page.get_by_role("alert", name="Files that others refer to are missing", exact=True)
 
@@ -119,25 +108,6 @@ def opened(open_page, name, **settings):
     return page
 
 
-@contextlib.contextmanager
-def held(page, address):
-    """Delay the first request to an address until the end of the block; others pass."""
-    waiting = []
-
-    def hold(route):
-        if waiting:
-            route.fallback()
-        else:
-            waiting.append(route)
-
-    page.route(address, hold)
-    yield
-    [route] = waiting
-    with page.expect_response(lambda answer: answer.request == route.request):
-        route.continue_()
-    page.unroute(address, hold)
-
-
 def tool_at(page):
     return page.get_by_label("Tool at", exact=True)
 
@@ -151,18 +121,3 @@ def tools(page):
     settled(page)
     drawn = np.reshape(json.loads(drawing(page).get_attribute("data-tool")), (4, 4))
     return drawn, np.array(json.loads(tool_at(page).get_attribute("data-tool")))
-
-
-def paste(field, text):
-    """Paste a text into a field, as from a spreadsheet."""
-    field.evaluate(
-        """(element, text) => {
-            const data = new DataTransfer();
-            data.setData("text/plain", text);
-            const how = { clipboardData: data, bubbles: true, cancelable: true };
-            const event = new ClipboardEvent("paste", how);
-            element.focus();
-            if (element.dispatchEvent(event)) document.execCommand("insertText", false, text);
-        }""",
-        text,
-    )
