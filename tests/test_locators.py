@@ -9,13 +9,9 @@ STRUCTURAL = {"locator", "query_selector", "query_selector_all", "wait_for_selec
 ALLOWED = {
     "define/page.py": {"field"},
     "robot_page.py": {"drawings", "joint_track"},
-    "test_embedding.py": {
-        "test_a_listed_page_frames_one_view_without_controls_and_nothing_else",
-        "test_with_accounts_another_site_needs_a_token_although_the_browser_is_signed_in",
-    },
-    "test_events_page.py": {"isolated"},
+    "test_embedding.py": {"test_a_listed_page_frames_one_view_without_controls_and_nothing_else"},
     "test_lichtblick.py": {"test_the_arm_has_the_silhouette_of_its_shapes_and_its_colours"},
-    "test_recordings_page.py": {"curves_area", "moment_line", "note_range"},
+    "test_recordings_page.py": {"curves_area", "moment_line"},
 }
 
 

@@ -16,7 +16,6 @@ from controllers.simulated.fault_requests import Mesh
 from controllers.unit.simulated import service as simulator
 from protocol_gateway import gateway
 from protocol_gateway.configuration.settings import RobotSettings
-from protocol_gateway.legacy.settings import LegacySettings
 from robomesh.contract.endpoints import router_config
 from robomesh.contract.keys import WHOLE_SITE
 from robomesh.contract.messages import reason_message
@@ -74,7 +73,6 @@ class Plant:
         address: Address of the console.
         endpoint: Endpoint of the router.
         rate_hz: States a second of each arm: as smooth to the eye as the 100 of real ones, and cheaper.
-        legacy_port: The port at which old client programs connect to `pt600`; `arm` accepts none.
         session: The tests' session on the mesh; use it in the plant's thread, by `call`.
     """
 
@@ -85,7 +83,6 @@ class Plant:
     rate_hz: float = 25.0
     address: str = ""
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
-    legacy_port: int = field(default_factory=free_port)
     loop: asyncio.AbstractEventLoop = field(init=False)
     session: Session | None = None
     controllers: dict = field(default_factory=dict)
@@ -155,9 +152,6 @@ class Plant:
                                         host="127.0.0.1",
                                         port=self.controllers[name][1],
                                         stop_proven=True,
-                                        legacy_clients=LegacySettings(host="127.0.0.1", port=self.legacy_port)
-                                        if name == "pt600"
-                                        else None,
                                     )
                                     for name in self.robots
                                 ),

@@ -155,16 +155,6 @@ def scene(page):
     return page.get_by_role("img", name=re.compile(r"^3-D view\."))
 
 
-def journal_lines(page):
-    """Return the lines of the journal that are drawn."""
-    return page.get_by_role("group", name=re.compile("^(Journal|日志)$")).get_by_role("button")
-
-
-def journal_entry(page):
-    """Return all that is known of the line that was chosen."""
-    return page.get_by_role("region", name=re.compile("^(Entry|条目)$"))
-
-
 def tiles(page):
     """Return the robots of the fleet."""
     return page.get_by_role("region", name=re.compile("^Site ")).get_by_role("listitem").get_by_role("link")

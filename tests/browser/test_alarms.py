@@ -1,4 +1,4 @@
-"""The page of an arm that does not obey: ignored stops, faults."""
+"""The page of an arm that ignores its stop."""
 
 import re
 
@@ -10,7 +10,6 @@ from tests.browser.robot_page import (
     alarm_band,
     button,
     fault,
-    joints_notice,
     ready,
     reset_stop,
     serious,
@@ -61,22 +60,3 @@ def test_an_arm_that_does_not_heed_its_stop_is_an_alarm_that_nothing_hides(open_
     reset_stop(page)
     set_speed(page, 100)
     button(page, "Release").click()
-
-
-def test_a_controllers_own_fault_can_be_reset_and_nothing_else_is_offered(open_page, plant):
-    page = open_page(ARM, drawn=False)
-    ready(page)
-    with fault(plant, "fault"):
-        expect(state_word(page)).to_have_text("Fault")
-        expect(stop_panel(page)).to_contain_text("The controller has a fault")
-        expect(button(page, "Home")).to_be_disabled()
-        expect(button(page, "waist +1°")).to_be_disabled()
-        expect(joints_notice(page)).to_have_text("See to it, then reset: no motion until then.")
-        assert page.get_by_role("slider", name="Target of").count() == 0
-    button(page, "Reset").click()
-    expect(stop_panel(page)).to_have_count(0)
-    expect(button(page, "Home")).to_be_enabled()
-    # At the end, because the check may block the page for longer than control lasts.
-    with fault(plant, "fault"):
-        expect(state_word(page)).to_have_text("Fault")
-        assert serious(page) == []

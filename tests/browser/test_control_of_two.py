@@ -1,4 +1,4 @@
-"""Two browsers before one robot: who controls it, how control goes from one to the other, and steps."""
+"""Two browsers before one robot: how control goes from one to the other, and keys on steps."""
 
 import re
 from functools import partial
@@ -9,7 +9,6 @@ from playwright.sync_api import Error, expect
 from tests.browser.robot_page import (
     ARM,
     answer,
-    answers_of,
     audited,
     button,
     clear_stop,
@@ -17,11 +16,9 @@ from tests.browser.robot_page import (
     control_requests,
     degrees,
     joint_value,
-    joints_notice,
     move_slowly,
     ready,
     region,
-    requests,
     reset_stop,
     serious,
     state_word,
@@ -101,44 +98,6 @@ def test_taking_over_needs_a_reason_which_the_loser_is_told(open_arm):
     button(bob, "Release").click()
 
 
-@pytest.mark.long
-def test_a_question_stays_while_it_is_not_known_who_is_in_control(open_arm):
-    alice, bob = open_arm(), open_arm()
-    answers_come = answers_of(bob)
-    bob.reload()
-    take(alice, "alice")
-    bob.get_by_label("Your name").fill("bob")
-    button(bob, "Take over…").click()
-    bob.get_by_label("Reason").fill("smoke at the gripper")
-    answers_come(False)
-    expect(who_controls(bob)).to_have_text("Who is in control is not known")
-    expect(bob.get_by_label("Reason")).to_have_value("smoke at the gripper")
-    answers_come(True)
-    expect(who_controls(bob)).not_to_have_text("Who is in control is not known")
-    expect(bob.get_by_label("Reason")).to_be_focused()
-    bob.keyboard.press("Escape")
-    expect(button(bob, "Take over…")).to_be_focused()
-
-
-@pytest.mark.long
-def test_a_running_motion_is_not_handed_over_but_stopped_by_a_take_over(open_arm):
-    alice, bob = open_arm(), open_arm()
-    ready(alice, "alice")
-    move_slowly(alice)
-    ask(bob, "bob")
-    answer(alice, "Hand over to bob")
-    answer(bob, "Accept")
-    expect(control_notice(bob)).to_contain_text("Control not given: alice's motion is still running")
-    button(bob, "Take over…").click()
-    expect(bob.get_by_role("form", name="Take over from alice")).to_contain_text(
-        "alice's motion is running: it will be stopped"
-    )
-    take_over(bob, "bob", "alice", "wrong way")
-    expect(stop_panel(bob)).to_contain_text("taken by bob: wrong way")
-    expect(state_word(bob)).to_have_text("Stopped")
-    clear_stop(bob)
-
-
 def test_a_killed_browser_loses_control_at_once_and_its_motion_is_stopped(open_arm):
     alice, bob = open_arm(), open_arm()
     ready(alice, "alice")
@@ -153,19 +112,6 @@ def test_a_killed_browser_loses_control_at_once_and_its_motion_is_stopped(open_a
     clear_stop(bob)
 
 
-def test_the_same_name_in_two_windows_is_in_control_in_one(open_arm):
-    first, second = open_arm(), open_arm()
-    take(first, "li")
-    second.get_by_label("Your name").fill("li")
-    expect(who_controls(second)).to_have_text("You (li) are in control in another window")
-    expect(button(second, "Ask for control")).to_have_count(0)
-    take_over(second, "li", "li", "I sit here now")
-    expect(who_controls(second)).to_have_text("You are in control")
-    expect(control_notice(first)).to_have_text("Control ended: taken by li: I sit here now")
-    expect(who_controls(first)).to_have_text("You (li) are in control in another window")
-    button(second, "Release").click()
-
-
 @pytest.mark.long
 def test_a_key_that_is_held_down_is_one_step(open_arm, plant):
     page = open_arm()
@@ -178,32 +124,6 @@ def test_a_key_that_is_held_down_is_one_step(open_arm, plant):
     expect(joint_value(page, "waist")).to_have_text(f"{waist + 1:.2f}°")
     expect(state_word(page)).to_have_text("Idle")
     assert audited(plant, "MOVE_RELATIVE") == moves + 1
-
-
-@pytest.mark.long
-def test_a_step_beyond_a_limit_is_refused_at_its_row_with_value_and_limit(open_arm):
-    page = open_arm()
-    ready(page)
-    handle = page.get_by_role("slider", name="Target of elbow")
-    for key in ("PageDown", "PageDown", "Enter"):
-        handle.press(key)
-    expect(joint_value(page, "elbow")).to_have_text("−110.00°")
-    expect(state_word(page)).to_have_text("Idle")
-    button(region(page, "Joints"), "5").click()
-    button(page, "elbow −5°").click()
-    expect(joints_notice(page)).to_have_text(
-        "Not sent: joint elbow at −115.00° is beyond its limit −110.00°."
-    )
-    refused = page.get_by_role("group", name="elbow", exact=True).get_by_role("strong")
-    expect(refused).to_have_text("−110")
-    button(page, "Requests").click()
-    refusal = requests(page).filter(has_text="elbow −5.00°").first
-    expect(refusal).to_contain_text("refused")
-    button(page, "elbow +5°").click()
-    expect(joint_value(page, "elbow")).to_have_text("−105.00°")
-    done = re.compile(r"^\S+li: elbow \+5\.00°, done in \d+\.\d\u202fs$")
-    expect(requests(page).first).to_have_text(done)
-    expect(refused).to_have_count(0)
 
 
 def test_space_on_a_step_button_stops_and_steps_nothing(open_arm, plant):

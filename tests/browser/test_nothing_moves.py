@@ -69,6 +69,10 @@ def test_controls_keep_their_places_while_messages_come_and_go(page, open_page):
     expect(region(page, "Record…")).to_be_visible()
     assert page.evaluate(PLACES) == before
     page.get_by_role("button", name=re.compile("^Record")).first.click()
+    button(page, "Note…").click()
+    expect(page.get_by_role("form", name="Note")).to_be_visible()
+    assert page.evaluate(PLACES) == before
+    button(page, "Note…").click()
     # A refusal of several lines, with its cause.
     field = page.get_by_label("Type a target of waist", exact=True)
     for _ in range(20):

@@ -1,4 +1,4 @@
-"""End of the page's messages with their cause: speed, motions, losses of control."""
+"""Control of a page that is slow or blocked: renewed beside it, and lost with the reason."""
 
 import re
 
@@ -8,15 +8,9 @@ from playwright.sync_api import expect
 from tests.browser.robot_page import (
     ARM,
     answers_of,
-    button,
     control_notice,
-    move_slowly,
-    ready,
     region,
-    reset_stop,
-    set_speed,
     stand_still,
-    stop_panel,
     take,
     who_controls,
 )
@@ -24,44 +18,6 @@ from tests.browser.robot_page import (
 pytestmark = pytest.mark.browser
 
 ROBOTS = ("arm",)
-
-
-def speed(page):
-    """Return the speed beside its slider."""
-    return region(page, "Control").get_by_text(re.compile(r"^\d+\s%$"))
-
-
-def speed_hint(page):
-    return region(page, "Control").get_by_role("status").filter(has_text=re.compile("^Low"))
-
-
-@pytest.mark.long
-def test_everybody_sees_the_speed_that_was_set_and_a_low_one_stands_out(open_page):
-    alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
-    ready(alice, "alice")
-    set_speed(alice, 2)
-    button(alice, "Release").click()
-    expect(speed(bob)).to_have_text(re.compile(r"2\s%"))
-    expect(speed_hint(bob)).to_have_text("Low: the arm moves slowly.")
-    take(bob, "bob")
-    set_speed(bob, 100)
-    expect(speed(alice)).to_have_text(re.compile(r"100\s%"))
-    expect(speed_hint(alice)).to_have_count(0)
-    button(bob, "Release").click()
-
-
-def test_a_window_that_is_closed_has_not_given_control_back(open_page):
-    alice, bob = open_page(ARM, drawn=False), open_page(ARM, drawn=False)
-    ready(alice, "alice")
-    move_slowly(alice)
-    alice.close()
-    expect(stop_panel(bob)).to_contain_text(
-        re.compile("alice's page or program has disconnected|page was hidden or closed")
-    )
-    take(bob, "bob")
-    reset_stop(bob)
-    set_speed(bob, 100)
-    button(bob, "Release").click()
 
 
 @pytest.mark.long

@@ -1,28 +1,23 @@
 """From unit to pixel through real processes: `robomesh up`, and its page in a real Chromium."""
 
 import json
-import re
-import signal
 
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, NO_WEBGL, PATIENCE_MS
+from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, PATIENCE_MS
 from tests.browser.robot_page import (
     button,
     degrees,
     drag,
     ready,
-    region,
     reset_stop,
     sent,
     state_word,
     stop_button,
-    take,
     wait_to_move,
-    who_controls,
 )
-from tests.site import kill, robomesh, running_site, wait_until
+from tests.site import robomesh, running_site, wait_until
 
 pytestmark = [pytest.mark.browser, pytest.mark.processes]
 
@@ -65,30 +60,6 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
     assert counts["joints"]["lost"] == 0
     assert counts["audit"]["messages"] >= 3
     assert counts["video/free"]["messages"] > 0
-
-
-def test_a_gateway_that_answers_no_more_is_told_as_what_it_may_be(site):
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
-        page = browser.new_page(viewport={"width": 1024, "height": 768})
-        page.add_init_script(NO_WEBGL)
-        page.goto(f"{site.console}#/test/arm")
-        take(page)
-        gateway = site.children()["gateway"]
-        kill(gateway, signal.SIGSTOP)
-        try:
-            notice = region(page, "Control").get_by_role("alert")
-            expect(notice).to_contain_text(
-                re.compile(r"Control ended: the gateway has not answered for \d s\.")
-            )
-            expect(notice).to_contain_text("the arm may still be moving")
-            expect(button(page, "Home")).to_be_disabled()
-            expect(who_controls(page)).to_have_text("Who is in control is not known")
-        finally:
-            kill(gateway, signal.SIGCONT)
-        expect(notice).to_contain_text(re.compile(r"not renewed within \d s"))
-        expect(who_controls(page)).to_have_text("Nobody is in control")
-        browser.close()
 
 
 def recordings(site):

@@ -2,18 +2,15 @@
 
 import threading
 from contextlib import contextmanager
-from fractions import Fraction
 
 import av
 import numpy as np
 import pytest
-from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from playwright.sync_api import expect
 
 from tests.browser.robot_page import (
     video_age,
-    video_panel,
     video_picture,
 )
 
@@ -89,37 +86,4 @@ def test_a_joiner_sees_the_frames_since_the_key_frame_then_live_ones(open_page, 
             "return c.getContext('2d').getImageData(9, 9, 1, 1).data[2] > 150 }"
         )
     expect(video_age(page)).to_contain_text("stale 1")
-    publisher.close()
-
-
-def test_a_browser_without_a_decoder_shows_still_pictures_and_says_so(open_page, plant):
-    publisher = publisher_of(plant, "image/front")
-    page = open_page("#/hall/arm", drawn=False)
-    page.add_init_script("delete window.VideoDecoder")
-    page.reload()
-    picture = av.VideoFrame.from_ndarray(np.full((90, 160, 3), 90, dtype=np.uint8), format="rgb24")
-    codec = av.CodecContext.create("mjpeg", "w")
-    codec.width, codec.height, codec.pix_fmt = 160, 90, "yuvj420p"
-    codec.time_base = Fraction(1, 5)
-    (packet,) = codec.encode(picture.reformat(format="yuvj420p"))
-    with repeated(lambda: publisher.put(CompressedImage(data=bytes(packet), format="jpeg"))):
-        expect(video_picture(page)).to_be_visible()
-        page.wait_for_function("() => document.querySelector('.camera img').naturalWidth === 160")
-        expect(video_age(page)).to_have_count(0)
-    expect(video_panel(page)).to_contain_text("Still pictures")
-    publisher.close()
-
-
-@pytest.mark.long
-def test_a_refused_video_is_explained(open_page, plant):
-    publisher, encoder = publisher_of(plant, "video/front"), Encoder()
-    message, key = encoder.frame(200, 30, 30)
-    publisher.put(message, key_frame=key)
-    page = open_page("#/hall/arm", drawn=False, refused=True)
-    expect(video_picture(page)).to_have_attribute("data-drawn", "true")
-    page.get_by_role("button", name="Save MP4").click()
-    # This site has no renderer, so the console refuses the video.
-    expect(video_panel(page)).to_contain_text(
-        "The video was not saved: no renderer answers for hall/arm: check that its name"
-    )
     publisher.close()

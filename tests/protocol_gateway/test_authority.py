@@ -121,6 +121,18 @@ def test_every_end_of_a_lease_stops_its_holders_motion(end):
     assert not end(held()).stop
 
 
+@pytest.mark.parametrize(
+    ("cause", "why"),
+    [
+        (LeaseRequest.HIDDEN, codes.ENDED_HIDDEN),
+        (LeaseRequest.NO_RIGHT, codes.ENDED_NO_RIGHT),
+        (LeaseRequest.SIGNED_OUT, codes.ENDED_SIGNED_OUT),
+    ],
+)
+def test_a_released_lease_has_its_clients_cause(cause, why):
+    assert ask(held(), A.RELEASE, lease="s", cause=cause).ended.why == why(name="li")
+
+
 def test_motion_is_over_when_the_robot_has_been_still_for_half_a_second():
     state, uncommanded = see(moving(), True, 0.1)
     assert not uncommanded

@@ -130,7 +130,12 @@ test("a renewal without an answer is tried again, and control ends when the leas
     await vi.advanceTimersByTimeAsync(100);
     for (const request of requests.splice(0)) refuse(request);
   }
-  expect(state()).toEqual([undefined, expect.stringMatching(/2 s/)]);
+  expect(state()).toEqual([
+    undefined,
+    expect.stringMatching(/^Control ended: the gateway has not answered for 2 s\. .*the arm may still be moving/),
+  ]);
+  published("", 10, { ended: "not renewed within 2 s" });
+  expect(state()).toEqual([undefined, expect.stringMatching(/not renewed within 2 s/)]);
 });
 
 test.each([

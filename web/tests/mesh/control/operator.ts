@@ -18,7 +18,7 @@ export async function takeControl(robotKey = ROBOT): Promise<void> {
     { topic: "joints", afterS: 1 },
     { topic: "video/*", afterS: 1 },
   ];
-  await connect({ session: "page1", stale } as never);
+  await connect({ site: "hall", session: "page1", stale } as never);
   setOperator("li");
   const taken = take(robotKey);
   const now = GATEWAY_MS + performance.now();

@@ -179,6 +179,30 @@ test.each([
   }
 });
 
+test("a reason stays while it is not known who is in control, and Escape gives the focus back", () => {
+  draw("wang");
+  button("Take over…").focus();
+  press("Take over…");
+  type(".reason input", "smoke");
+  draw(null, { holder: "wang" });
+  expect(texts(".holder")).toEqual(["Who is in control is not known"]);
+  draw("wang");
+  expect([find<HTMLInputElement>(".reason input").value, document.activeElement]).toEqual([
+    "smoke",
+    find(".reason input"),
+  ]);
+  key(".reason input", "Escape");
+  expect(document.activeElement).toBe(button("Take over…"));
+});
+
+test("a name that is in control in another window takes over from itself", async () => {
+  draw("li");
+  press("Take over…");
+  type(".reason input", "I sit here now");
+  submit();
+  expect(await nextAsked()).toEqual(["li", "TAKE", "I sit here now", ""]);
+});
+
 test("a monitor's account is offered no control, and sees no requests for it", () => {
   account.me.value = { account: "gu", role: "monitor" } as typeof account.me.value;
   draw("wang", { askedBy: [asker("chen")] });
