@@ -19,8 +19,6 @@ if __name__ == "__main__":
 import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
-from robomesh import reason_codes
-from robomesh.contract.messages import reason_message
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import Session, SessionSettings, open_session
@@ -61,7 +59,7 @@ class Crowd:
         assert self._started.wait(STARTED_S), "the crowd did not start: its traceback is above"
 
     def mark(self, state: str, names: Sequence[str]) -> None:
-        """Mark robots as `faulty`, `read_only` or `silent`; all others of the crowd are not."""
+        """Mark robots as `faulty` or `silent`; all others of the crowd are not."""
         assert self._process.stdin
         print(json.dumps([state, list(names)]), file=self._process.stdin, flush=True)
 
@@ -132,7 +130,7 @@ async def publish(session: Session, names: Sequence[str], states: dict[str, set[
             if name in states["silent"]:
                 continue
             if (health_key + i) % STATE_BEATS == 0:
-                state = _state(i, faulty=name in states["faulty"], read_only=name in states["read_only"])
+                state = _state(i, faulty=name in states["faulty"])
                 publishers[name]["controller"].put(state)
                 publishers[name]["lease"].put(_lease(i))
             if name in watched:
@@ -147,7 +145,7 @@ def _lease(i: int) -> schema.Lease:
     return lease
 
 
-def _state(i: int, *, faulty: bool, read_only: bool) -> State:
+def _state(i: int, *, faulty: bool) -> State:
     state = State(
         link=State.UP,
         mode=State.REMOTE,
@@ -155,10 +153,7 @@ def _state(i: int, *, faulty: bool, read_only: bool) -> State:
         fault="axis 2: following error" if faulty else "",
         homed=State.YES,
         last_unit_age_s=0.01,
-        read_only=read_only,
     )
-    if read_only:
-        state.link_reasons.append(reason_message(reason_codes.READ_ONLY(reason_codes.READS_ONLY())))
     state.timestamp.GetCurrentTime()
     return state
 
@@ -176,7 +171,7 @@ def _joints(joints: Joints, seconds: float) -> JointStates:
 async def main(endpoint: str, count: str, *sites: str) -> None:
     """Publish until stdin ends."""
     names = [f"{sites[i % len(sites)]}/r{i:03d}" for i in range(int(count))]
-    states: dict[str, set[str]] = {"faulty": set(), "read_only": set(), "silent": set()}
+    states: dict[str, set[str]] = {"faulty": set(), "silent": set()}
     async with open_session(SessionSettings(connect=(endpoint,), wait_s=20.0)) as session:
         publishing = asyncio.create_task(publish(session, names, states))
         publishing.add_done_callback(lambda task: task.cancelled() or task.result())

@@ -1,13 +1,10 @@
 """Every page, dark and light: axe finds nothing serious; in Chinese nothing of the page itself is English."""
 
-import re
-
 import pytest
 from playwright.sync_api import expect
 
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.browser.robot_page import alarms, keep_picture, serious, visit
-from tests.site import wait_until
 
 pytestmark = pytest.mark.browser
 
@@ -35,11 +32,6 @@ const found = [];
 for (let node = walker.nextNode(); node; node = walker.nextNode())
   if (/[A-Za-z]{2,} [a-z]{2,} [a-z]{2,}/.test(node.data) && own(node)) found.push(node.data.trim());
 found
-"""
-SMALL = """
-[...document.querySelectorAll("button, select, input:not([type=checkbox])")]
-  .filter(e => e.offsetParent && e.getBoundingClientRect().height < 44)
-  .map(e => e.outerHTML.slice(0, 80))
 """
 
 
@@ -79,30 +71,6 @@ def test_axe_finds_nothing_serious_on_any_page_and_a_chinese_page_is_chinese(
     assert found == {path: [] for path in PICTURED}
 
 
-HOLD_THE_LONGEST_WAIT = """
-const start = window.setTimeout;
-window.setTimeout = (act, ms, ...more) =>
-  ms === 2000 ? ((window.endTheWait = act), 0) : start(act, ms, ...more);
-"""
-
-
-def test_nothing_is_shown_in_english_while_the_chinese_texts_are_loaded(contexts, plant):
-    context, kind = contexts.lend(locale="zh-CN")
-    page = context.new_page()
-    catalogue = []
-    page.add_init_script(HOLD_THE_LONGEST_WAIT)
-    page.route(re.compile("/assets/zh-"), lambda route: catalogue.append(route))
-    page.goto(plant.address)
-    wait_until(lambda: page.title() and catalogue)  # a question to the page lets its requests come here
-    expect(page.get_by_text(re.compile(r"\w"))).to_have_count(0)
-    # The stop does not wait for a catalogue that does not come.
-    page.evaluate("endTheWait()")
-    expect(page.get_by_role("button", name="Stop request")).to_be_visible()
-    catalogue[0].continue_()
-    expect(page.get_by_role("navigation", name="页面")).to_contain_text("机群")
-    contexts.give_back(context, kind, plant.address)
-
-
 def test_the_first_stop_of_the_tab_key_skips_the_bar(open_page):
     page = open_page(drawn=False)
     visit(page, "#/settings")
@@ -115,12 +83,3 @@ def test_the_first_stop_of_the_tab_key_skips_the_bar(open_page):
     expect(skip).not_to_be_in_viewport()
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.closest('main') !== null")
-
-
-def test_no_page_scrolls_sideways_on_a_phone_and_everything_is_large_enough_for_a_thumb(open_page, alarmed):
-    page = open_page(width=360, height=740, has_touch=True, drawn=False)
-    found = {}
-    for path in ("#/", "#/events", "#/settings"):
-        visit(page, path)
-        found[path] = [page.evaluate("document.documentElement.scrollWidth"), *page.evaluate(SMALL)]
-    assert found == {path: [360] for path in found}

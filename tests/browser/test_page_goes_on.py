@@ -1,4 +1,4 @@
-"""The page after a lost connection, missing files or a wrong link."""
+"""Stop requests of a page whose connection is dead or lost."""
 
 import re
 
@@ -13,7 +13,6 @@ from tests.browser.robot_page import (
     stop_button,
     stop_notice,
     take,
-    tiles,
     until,
 )
 
@@ -114,32 +113,3 @@ def test_an_old_press_of_stop_is_offered_when_the_connection_returns(open_page, 
     expect(again).to_have_count(0)
     take(page)
     clear_stop(page)
-
-
-@pytest.mark.long
-def test_a_page_whose_part_is_no_longer_there_says_so(open_page):
-    page = open_page(drawn=False)
-    expect(tiles(page)).not_to_have_count(0)
-    page.route("**/assets/wall-*.js", lambda route: route.fulfill(status=504))
-    page.evaluate("location.hash = '#/wall'")
-    expect(page.get_by_role("main").get_by_role("alert")).to_contain_text("This page could not be loaded")
-    page.unroute("**/assets/wall-*.js")
-    button(page, "Load again").click()
-    expect(page.get_by_role("article").first).to_be_visible()
-
-
-@pytest.mark.long
-def test_a_link_to_what_no_robot_can_be_called_is_said_and_costs_no_connection(open_page):
-    page = open_page(drawn=False)
-    page.add_init_script(WORLD)
-    for path, robot in (
-        ("#/Hall/arm", "arm at Hall"),
-        ("#/hall/a%2Fb", "a/b at hall"),
-        ("#/hall/%zz", "%zz at hall"),
-    ):
-        page.evaluate("path => (location.hash = path)", path)
-        page.reload()
-        expect(page.get_by_role("heading", level=1)).to_have_text(f"There is no robot {robot}.")
-        expect(page.get_by_role("main").get_by_role("listitem")).not_to_have_count(0)
-        expect(button(page, "Stop request: all")).to_be_enabled()
-        assert page.evaluate("sockets.length") == 1

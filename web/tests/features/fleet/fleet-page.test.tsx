@@ -105,6 +105,19 @@ test("filters by name, site and state show what they left out, and are cleared b
   type('input[type="search"]', "");
 });
 
+test("a tile has the reason of its robot's state and its marks, and leads to it", async () => {
+  for (let i = 0; i < 5; i++) {
+    send("hall/b", { ...READY, readOnly: true, capabilities: { slowHz: 2 } });
+    send("hall/c", { ...READY, activity: Activity.FAULT, fault: "axis 2: following error" });
+    publish("robomesh/hall/b/lease", LeaseSchema, {});
+    await pass(300);
+  }
+  expect(tile("hall/b").textContent).toMatch(/read-only.*slow: 2\/s.*Nobody is in control/);
+  expect(tile("hall/c").textContent).toContain("axis 2: following error");
+  expect(tile("hall/c").textContent).not.toMatch(/read-only|slow: /);
+  expect(tile("hall/c").getAttribute("href")).toBe("#/hall/c");
+});
+
 test("a tile says who has control while that is known, and a stale robot is never shown as live", async () => {
   send("hall/b");
   publish("robomesh/hall/b/lease", LeaseSchema, { holder: "wang", since: timestampFromMs(1e12) });
