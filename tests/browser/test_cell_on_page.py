@@ -1,4 +1,4 @@
-"""A robot's page in a cell: surroundings, checks and runs, against a real site."""
+"""A robot's surroundings on its page, and a change of them, against a real site."""
 
 import asyncio
 import re
@@ -15,8 +15,6 @@ from tests.browser.robot_page import (
     region,
     scene,
     serious,
-    stop_panel,
-    who_controls,
 )
 from tests.conftest import last_value
 from tests.site import READY_S, running_site
@@ -45,10 +43,6 @@ cell = "a"
 name = "post"
 cylinder = [40.0, 900.0]
 pose = { xyz = [300.0, 250.0, 450.0] }
-"""
-PROGRAM = """speed 5
-move_joints 0 80 -80 0 0
-move_joints 0 90 -90 0 0
 """
 SLOWLY_MS = 40_000
 
@@ -111,21 +105,3 @@ def test_a_fixture_is_moved_with_numbers_after_a_confirmation_and_moved_back(ope
     expect(place.get_by_label("x")).to_have_value("300", timeout=SLOWLY_MS)
     assert file.read_text() == before
     expect(page.get_by_text("They change with a restart of the site's services.")).to_be_visible()
-
-
-def test_every_monitor_sees_the_line_of_the_program_that_runs_and_that_it_is_done(open_page, plant, tmp_path):
-    page = open_page(PAGE, drawn=False, width=360, height=740)
-    expect(page.get_by_text("motions are checked: required")).to_be_visible(timeout=SLOWLY_MS)
-    (tmp_path / "to-and-fro.robo").write_text(PROGRAM, encoding="utf-8")
-    with ThreadPoolExecutor() as threads:
-        file = str(tmp_path / "to-and-fro.robo")
-        sent = threads.submit(plant.site.command, "send", "arm", "run", file)
-        line = page.get_by_role("paragraph").filter(has_text=re.compile("^to-and-fro: "))
-        running = r"to-and-fro: step \d of 3, line 2: move_joints 0 80 -80 0 0; \w+; 00:\d\d, 00:\d\d left"
-        expect(line).to_have_text(re.compile(running), timeout=SLOWLY_MS)
-        assert page.evaluate("document.documentElement.scrollWidth") == 360
-        expect(line).to_have_text(re.compile("to-and-fro: done"), timeout=SLOWLY_MS)
-    # Its sender gave control back when the arm rested, and stopped nothing.
-    assert sent.result().returncode == 0
-    expect(who_controls(page)).to_have_text("Nobody is in control")
-    expect(stop_panel(page)).to_have_count(0)

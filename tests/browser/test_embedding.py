@@ -1,4 +1,4 @@
-"""Pictures and video of a console in pages of other origins, and opened by themselves, in Chromium."""
+"""Pictures and video of a console in pages of other origins, in Chromium."""
 
 import asyncio
 import http.server
@@ -7,13 +7,10 @@ import threading
 import pytest
 from playwright.async_api import Error, async_playwright
 
-from services.console.accounts.view_access import revoke_token
 from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, PATIENCE_MS
 from tests.conftest import run
-from tests.services.signing_in import PASSWORD
 from tests.services.test_console import page  # noqa: F401
 from tests.services.test_console_pictures import rendered
-from tests.services.test_view_tokens import allow, shown, until_known
 from web import build_page
 
 pytestmark = pytest.mark.browser
@@ -26,13 +23,6 @@ SHOWN = """() => ["moving", "still", "shared"].every((id) => document.getElement
 FRAMES = """<!doctype html><iframe id="view" src="http://{0}/view/s/r/front?theme=light&language=en"></iframe>
 <iframe id="page" src="http://{0}/"></iframe><iframe id="trick" src="http://{0}/view/..%2Findex.html"></iframe>"""
 VIEW_SHOWN = """() => document.querySelector(".frame:not(.stale) img")?.naturalWidth > 0"""
-TOKENS = """<!doctype html><iframe id="token" src="http://{0}/view/s/r/front?token={1}&language=en"></iframe>
-<iframe id="bare" src="http://{0}/view/s/r/front?language=en"></iframe>
-<img id="still" src="http://{0}/image/s/r/front.jpg?token={1}"><img id="refused" src="http://{0}/image/s/r/front.jpg">"""
-SIGN_IN = """async (password) => (await fetch("/account/sign-in", {
-  method: "POST", headers: { "Content-Type": "application/json" },
-  body: JSON.stringify({ name: "zhao", password }),
-})).status"""
 NAMES = ("view", "page", "trick")
 FAILED = """() => new Promise((resolve) => {
   const image = new Image();
@@ -86,11 +76,6 @@ def test_pages_of_listed_origins_show_pictures_and_video_and_others_do_not(mesh,
                 await tab.goto(f"{origin}/", timeout=PATIENCE_MS)
                 script = FAILED.replace("ADDRESS", f"'http://{address}/image/s/r/front.jpg'")
                 assert await tab.evaluate(script) == result
-            # By itself, without any page.
-            await tab.goto(f"http://{address}/video/s/r/front.mp4", wait_until="commit")
-            playing = "() => document.querySelector('video')?.currentTime > 0.2"
-            # Without a script Chromium waits, nearly a minute here, until it has buffered enough.
-            await tab.wait_for_function(playing, timeout=2 * PATIENCE_MS)
             await browser.close()
             await asyncio.sleep(0)
 
@@ -137,47 +122,6 @@ def test_a_listed_page_frames_one_view_without_controls_and_nothing_else(mesh, i
             for name in NAMES:
                 frame = await (await tab.query_selector(f"#{name}")).content_frame()
                 assert frame.url.startswith("chrome-error:")
-            await browser.close()
-
-    run(main(), timeout_s=180.0)
-
-
-@pytest.mark.long
-def test_with_accounts_another_site_needs_a_token_although_the_browser_is_signed_in(mesh, intranet, tmp_path):
-    (listed, _), pages = intranet
-    other_site = listed.replace("127.0.0.1", "localhost")  # ports are no part of a site
-    build_page.build()
-
-    async def main():
-        async with (
-            shown(mesh, build_page.DIST, tmp_path, embed=(other_site,)) as (client, _, _, accounts),
-            async_playwright() as playwright,
-        ):
-            token = allow(accounts)
-            await until_known(client, f"/image/s/r/front.jpg?token={token}")
-            pages["/tokens"] = TOKENS.format(client.address, token)
-            browser = await playwright.chromium.launch(
-                executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS
-            )
-            context = await browser.new_context()
-            console = await context.new_page()
-            await console.goto(f"http://{client.address}/", timeout=PATIENCE_MS)
-            assert await console.evaluate(SIGN_IN, PASSWORD) == 200
-            await console.goto(f"http://{client.address}/view/s/r/front", timeout=PATIENCE_MS)
-            await console.wait_for_function(VIEW_SHOWN, timeout=PATIENCE_MS)  # signed in, no token
-            tab = await context.new_page()
-            await tab.goto(f"{other_site}/tokens", timeout=PATIENCE_MS)
-            frame, bare = [
-                await (await tab.query_selector(f"#{name}")).content_frame() for name in ("token", "bare")
-            ]
-            await frame.wait_for_function(VIEW_SHOWN, timeout=PATIENCE_MS)
-            notice = bare.get_by_role("alert").filter(has_text="no account is signed in")
-            await notice.wait_for(timeout=PATIENCE_MS)
-            widths = "() => ['still', 'refused'].map((id) => document.getElementById(id).naturalWidth > 0)"
-            assert await tab.evaluate(widths) == [True, False]
-            assert [cookie["sameSite"] for cookie in await context.cookies()] == ["Strict"]
-            revoke_token(accounts, "wall")
-            await frame.get_by_role("alert").filter(has_text="is revoked").wait_for(timeout=PATIENCE_MS)
             await browser.close()
 
     run(main(), timeout_s=180.0)

@@ -8,11 +8,7 @@ from playwright.sync_api import expect
 
 from tests.browser.rendering import rendering
 from tests.browser.robot_page import (
-    ARM,
-    fault,
     serious,
-    state_word,
-    take,
     video_picture,
 )
 
@@ -38,52 +34,6 @@ def changes(page, place=".wall-tile"):
     before = page.evaluate(PIXELS, place)
     page.wait_for_function(f"([place, before]) => ({PIXELS})(place) !== before", arg=[place, before])
     return before.split()[0]
-
-
-def test_what_is_chosen_stands_in_the_address_and_keys_go_from_tile_to_tile(open_page):
-    page = open_page("#/wall", drawn=False)
-    tiles = page.get_by_role("article")
-    expect(tiles).to_have_count(2)
-    page.get_by_role("button", name="Choose pictures").click()
-    page.get_by_role("group", name="hall/pt600").get_by_role("button", name="Top").click()
-    expect(tiles).to_have_count(3)
-    page.get_by_role("button", name="Done").click()
-    assert page.url.endswith("/wall/hall/arm/close/hall/pt600/close/hall/pt600/top")
-    page.reload()
-    expect(tiles).to_have_count(3)
-    tiles.nth(0).focus()
-    page.keyboard.press("ArrowRight")
-    page.keyboard.press("ArrowRight")
-    expect(tiles.nth(2)).to_be_focused()
-    tiles.nth(2).get_by_role("button").click()
-    expect(tiles).to_have_count(2)
-    assert page.url.endswith("/wall/hall/arm/close/hall/pt600/close")
-    tiles.nth(1).dblclick(position={"x": 40, "y": 40})
-    expect(page.get_by_role("heading", level=1)).to_have_text("pt600")
-
-
-@pytest.mark.long
-def test_a_robot_that_there_is_not_is_said_so_and_a_picture_that_does_not_come_too(open_page):
-    page = open_page("#/wall/hall/nobody/close/hall/arm/front", drawn=False)
-    expect(page.get_by_role("article").nth(0)).to_contain_text("not on the mesh")
-    expect(page.get_by_role("article").nth(1)).to_contain_text("Waiting for a picture")
-
-
-@pytest.mark.long
-def test_a_tile_gives_only_the_reason_of_its_state(open_page, plant):
-    page = open_page("#/wall/hall/arm/close/hall/replay-gone/close", drawn=False)
-    tile = page.get_by_role("article").nth(0)
-    expect(page.get_by_role("article").nth(1)).to_contain_text("This replay has ended")
-    with fault(plant, "fault"):
-        expect(tile).to_have_accessible_name(re.compile("Fault$"))
-        expect(tile.get_by_text("overheated")).to_be_visible()
-    expect(tile).to_have_accessible_name(re.compile("Stopped$"))
-    # The link's text, that it is connected, is no reason.
-    expect(tile.get_by_text("The controller has stopped by itself", exact=True)).to_be_visible()
-    page.evaluate("path => (location.hash = path)", ARM)
-    take(page)
-    page.get_by_role("button", name="Reset", exact=True).click()
-    expect(state_word(page)).to_have_text("Idle")
 
 
 @pytest.mark.long

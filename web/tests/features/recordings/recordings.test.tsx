@@ -3,10 +3,12 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { create } from "@bufbuild/protobuf";
 import { timestampFromMs } from "@bufbuild/protobuf/wkt";
+import { act } from "preact/test-utils";
 import { beforeEach, expect, test, vi } from "vitest";
 import {
   RecordingRequest_Action as Action,
   EventSchema,
+  NoteRequestSchema,
   RecordingListSchema,
   RecordingRequestSchema,
   RecordingSchema,
@@ -16,7 +18,7 @@ import {
   Event_Severity as Severity,
 } from "../../../src/gen/robomesh_pb";
 import { answer, connect, newPage, next, publish, read, refuse, requests, say } from "../../console";
-import { find, pass, texts, type } from "../../hands";
+import { find, pass, press, texts, type } from "../../hands";
 import { show, use } from "../../shown";
 
 type Fields = MessageInitShape<typeof RecordingSchema>;
@@ -62,6 +64,23 @@ test("recordings are listed with the newest first, and filtered by words, robot,
   await choose("Time", "any_time");
   await choose("Tag", "test");
   expect(shown()).toEqual(["weld"]);
+});
+
+test("a recording is compared with another one that is chosen next, unless it is cancelled", async () => {
+  const topics = [{ topic: "joints", messages: 9n }];
+  await list(RECORDINGS().map((each) => ({ ...each, topics })));
+  const buttons = [...document.querySelectorAll("button")].filter((each) => each.textContent === "Compare");
+  act(() => buttons.at(-1)?.click());
+  await pass();
+  expect(texts(".compare-line span")).toEqual(["Choose another recording to compare with weld."]);
+  const links = () =>
+    [...document.querySelectorAll("a")]
+      .filter((each) => each.textContent === "Compare with weld")
+      .map((each) => each.hash);
+  expect(links()).toEqual(["c", "b"].map((second) => `#/recordings/hall/a.mcap/hall/${second}.mcap`));
+  press("Cancel");
+  await pass();
+  expect([texts(".compare-line"), links()]).toEqual([[], []]);
 });
 
 test("a recording that runs is in the list while its state is fresh", async () => {
@@ -161,6 +180,58 @@ test("the steps of a program are folded under its start; a refused one, and thos
     [5],
     [6, 7],
   ]);
+});
+
+/** The list of a recording's events, while its player is somewhere [s]. */
+async function eventList(list: object[], moment = 0) {
+  const { EventList } = await import("../../../src/features/recordings/recorded/event-marks");
+  const { signal } = await import("@preact/signals");
+  const at = signal(moment);
+  const asked = { value: { list: list as never, cut: false }, problem: "" };
+  show(<EventList asked={asked} moment={at} seek={() => undefined} robotKey="robomesh/hall/arm" startMs={1e12} />);
+  await pass();
+  return at;
+}
+const rows = () => texts(".recorded-events > li");
+
+test("the steps of a run are shown by a press at it, and hidden by the next", async () => {
+  const of = { source: "program", severity: Severity.INFO, text: "li asked move" };
+  const step = (at: number) => ({ at, event: create(EventSchema, of) });
+  const run = { at: 1, event: create(EventSchema, { code: "program.started", text: "li runs square" }) };
+  await eventList([run, step(2), step(3)]);
+  expect(rows()).toEqual([expect.stringMatching(/li runs square.*2 steps$/)]);
+  press("2 steps");
+  expect([rows().length, rows()[1]]).toEqual([3, expect.stringContaining("li asked move")]);
+  expect(find(".run-steps").getAttribute("aria-expanded")).toBe("true");
+  press("2 steps");
+  expect(rows()).toHaveLength(1);
+});
+
+test("a note on a recording is on the range from where it was begun to the player's position", async () => {
+  const { setOperator } = await import("../../../src/mesh/control/control");
+  setOperator("wang");
+  const at = await eventList([{ at: 1, beside: true, event: create(EventSchema, { text: "starts late" }) }], 0.5);
+  expect(rows()).toEqual([expect.stringMatching(/starts late.*Not in the file/i)]);
+  press("Note");
+  type("form input[aria-label=Text]", "slips");
+  press("From here to the player's position");
+  at.value = 1.5;
+  await pass();
+  press("Save note");
+  expect(read(await next(), NoteRequestSchema)).toMatchObject({
+    text: "slips",
+    begin: timestampFromMs(1e12 + 500),
+    end: timestampFromMs(1e12 + 1500),
+  });
+});
+
+test("a note's range is marked on the time line, unless it was withdrawn", async () => {
+  const { EventMarks } = await import("../../../src/features/recordings/recorded/event-marks");
+  const note = { at: 1, until: 3, event: create(EventSchema, { code: "note.written", note: { text: "slips" } }) };
+  show(<EventMarks events={[note, { ...note, withdrawn: true }]} duration={4} seek={() => undefined} />);
+  expect(
+    [...document.querySelectorAll<HTMLElement>(".note-range")].map(({ style }) => [style.left, style.width]),
+  ).toEqual([["25%", "50%"]]);
 });
 
 async function openReplay(player = true) {
