@@ -47,7 +47,7 @@ from benchmarks.page.jog_wire import Proxy, UnitLog, rest_ms, until_rest
 from robots.descriptions.description import load
 from robots.kinematics.model import build_model, tool_placement
 from tests.browser.conftest import ARGUMENTS, CHROMIUM
-from tests.browser.hand import COVER, KINDS, SHOW_DIALOG, UNCOVER, Hand
+from tests.browser.hand import COVER, MOUSE, PEN, SHOW_DIALOG, TOUCH, UNCOVER, Hand
 from tests.browser.robot_page import take
 from tests.ports import free_port
 from web import build_page
@@ -72,7 +72,7 @@ BLOCK = """(ms) => { setTimeout(() => {
 def measure(
     only: str = ",".join(ENDS), hands: str = "mouse", runs: int = 5, speed: str = "fast"
 ) -> dict[str, Any]:
-    ends, kinds = chosen("--only", only, (*BY_HAND, *ENDS)), chosen("--hands", hands, KINDS)
+    ends, kinds = chosen("--only", only, (*BY_HAND, *ENDS)), chosen("--hands", hands, (MOUSE, TOUCH, PEN))
     build_page.build()
     found: dict[str, Any] = {"runs": runs, "speeds": {}}
     with (
