@@ -156,8 +156,8 @@ def _no_process(event: str, arguments: object) -> None:
     """Refuse a process that a quick test starts."""
     if not _in_quick_test or event not in ("subprocess.Popen", "os.fork", "os.posix_spawn"):
         return
-    # Outcomes of a pair study are cached, so that only the first test needs a process.
-    if "robots.bodies.pair_study" not in str(arguments):
+    # Outcomes of a pair study and places of libraries are cached: only the first test needs a process.
+    if not any(each in str(arguments) for each in ("robots.bodies.pair_study", "ldconfig")):
         raise AssertionError("this test starts a process: mark it `slow`")
 
 
