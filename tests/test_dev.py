@@ -17,7 +17,7 @@ from tests.run_parts import run_parts
 
 pytestmark = pytest.mark.slow
 
-PYTEST = (sys.executable, "-m", "pytest", "-q", "-p", "no:xdist")
+PYTEST = (sys.executable, "-m", "pytest", "-q", "--disable-plugin-autoload")
 PARTS = (("-m", "not other"), ("-m", "other"))
 TESTS = """
 import pathlib

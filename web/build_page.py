@@ -101,18 +101,17 @@ def format_sources() -> None:
 
 
 def test(arguments: list[str]) -> int:
-    """Run the page's unit tests and print their coverage by folder; return vitest's exit status.
+    """Run the page's unit tests; return vitest's exit status.
 
     Args:
-        arguments: Of vitest: files, or `-t NAME`. With some, there is no coverage.
+        arguments: Of vitest: files, `-t NAME`, or `--coverage`, which is printed by folder.
     """
     install(tools=True)
     write_types()
-    coverage = () if arguments else ("--coverage",)
-    vitest = [_node_program(), MODULES / "vitest" / "vitest.mjs", "run", *coverage, *arguments]
+    vitest = [_node_program(), MODULES / "vitest" / "vitest.mjs", "run", *arguments]
     plain = {} if sys.stdout.isatty() else {"NO_COLOR": "1", "FORCE_COLOR": "0"}
     status = subprocess.run(vitest, cwd=PAGE, env=_environment() | plain, check=False).returncode
-    if coverage and not status:
+    if "--coverage" in arguments and not status:
         for row in coverage_by_folder(
             json.loads((MODULES / ".coverage" / "coverage-summary.json").read_text())
         ):

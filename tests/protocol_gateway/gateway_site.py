@@ -23,6 +23,8 @@ C = schema.CommandRequest.Command
 A = schema.LeaseRequest.Action
 STATE = schema.ControllerState
 REPOSITORY = Path(__file__).resolve().parents[2]
+# States a second of a simulated controller: fewer than the 100 of real ones, and cheaper.
+RATE_HZ = 40.0
 TOPICS = ("joints", "joints/slow", "controller", "lease", "events", "audit", "raw", "program")
 LOOK_S = 0.01
 # Longer than a busy machine stands still, for whatever is not a test's subject.
@@ -142,7 +144,9 @@ async def simulator(**settings):
     """Run a simulated controller; yield its port."""
     said = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(
-        simulate(SimulatorSettings(**{"robot": "pt600", **settings}), ready=said.set_result)
+        simulate(
+            SimulatorSettings(**{"robot": "pt600", "rate_hz": RATE_HZ, **settings}), ready=said.set_result
+        )
     )
     await asyncio.wait([said, task], return_when=asyncio.FIRST_COMPLETED)
     try:
