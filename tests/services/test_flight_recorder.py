@@ -192,6 +192,25 @@ def test_only_old_segments_are_removed(mesh, tmp_path, monkeypatch):
     assert not list(tmp_path.glob(SAVED))
 
 
+async def test_segments_of_a_save_that_is_recording_stay(mesh, tmp_path, monkeypatch):
+    ended = threading.Event()
+    monkeypatch.setattr(flight, "_MIN_SEGMENT_S", 0.05)
+    monkeypatch.setattr(flight.FlightRecorder, "_is_too_long", lambda recorder, now: ended.is_set())
+    async with recording_site(mesh, tmp_path, flight=Flight(minutes=0.0005, after_s=600.0)) as session:
+        joints = session.declare_publisher("site", "arm", "joints")
+        await until(lambda: joints.watched)
+        await session.ask(KEY, Ask(action=Ask.SAVE, name="long"), timeout_s=WITHIN_S)
+        folder = tmp_path / ".flight" / "arm"
+        first, later = min(folder.glob("*.mcap")), set()
+        while len(later) < 5:
+            await asyncio.sleep(0.02)
+            later |= {*folder.glob("*.mcap")} - {first}
+        stays = first.exists()
+        ended.set()
+        await saved(tmp_path)
+    assert stays
+
+
 async def test_without_a_flight_recorder_a_save_is_refused(mesh, tmp_path):
     async with recording_site(mesh, tmp_path) as session:
         with refused(codes.FLIGHT_NONE):

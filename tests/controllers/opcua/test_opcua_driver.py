@@ -181,9 +181,10 @@ def test_keep_alive_repeats_joints_without_a_time():
 
 def test_speeds_are_the_joints_velocities_if_they_are_of_the_same_moment():
     speeds = [Item("speed", f"Axis_{n}", Unit(number_of("E96"), "°/s"), 1) for n in (1, 2)]
-    told = Told([*axes(DEGREE, DEGREE), *speeds])
-    told.values((0, 1.0), (1, 2.0), (2, 180.0), (3, 0.0))
-    assert told.joints.velocities == (pytest.approx(math.pi), 0.0)
+    joints = [OpcUaJoint(axis="Axis_1"), OpcUaJoint(axis="Axis_2", reversed=True)]
+    told = Told([*axes(DEGREE, DEGREE), *speeds], joints=joints)
+    told.values((0, 1.0), (1, 2.0), (2, 180.0), (3, 90.0))
+    assert told.joints.velocities == (pytest.approx(math.pi), pytest.approx(-math.pi / 2))
     told.values((0, 2.0, 1.0), (2, 90.0, 2.0))
     assert told.joints.velocities is None
     told.values((2, 90.0, 2.1, False), (0, 3.0, 2.1))
