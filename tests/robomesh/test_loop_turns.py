@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from robomesh.service import loop_turns
 from robomesh.service.loop_turns import LONG_S, OTHER, LoopTurns, MeasuredLoop, turns_of
 
 BLOCKED_S = 4 * LONG_S
@@ -39,6 +40,16 @@ def test_long_turn_is_reported_with_what_ran(what: str) -> None:
     assert any(took_s >= BLOCKED_S and cause == what for took_s, cause in found)
     assert turns.long_turns == len(found)
     assert turns.longest_s() >= BLOCKED_S
+
+
+def test_the_longest_turn_is_known_for_30_to_60_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter((0.0, 1.0, 31.0, 60.0, 62.0, 130.0))
+    monkeypatch.setattr(loop_turns, "_now_s", lambda: next(clock))
+    turns = LoopTurns()
+    turns.end(0.03)
+    found = [turns.longest_s() for _ in range(4)]
+    turns.end(0.02)
+    assert [*found, turns.longest_s()] == [0.03, 0.03, 0.03, 0.0, 0.0]
 
 
 def test_what_ran_in_one_turn_is_not_blamed_for_the_next() -> None:
