@@ -108,7 +108,7 @@ def test(arguments: list[str]) -> int:
     """
     install(tools=True)
     write_types()
-    vitest = [_node_program(), MODULES / "vitest" / "vitest.mjs", "run", *arguments]
+    vitest = [str(_node_program()), str(MODULES / "vitest" / "vitest.mjs"), "run", *arguments]
     plain = {} if sys.stdout.isatty() else {"NO_COLOR": "1", "FORCE_COLOR": "0"}
     status = subprocess.run(vitest, cwd=PAGE, env=_environment() | plain, check=False).returncode
     if "--coverage" in arguments and not status:
