@@ -7,6 +7,7 @@ import socket
 import time
 import urllib.request
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
@@ -18,7 +19,7 @@ from robomesh.publications import subscription as subscription_module
 from robomesh.requests.latencies import Latencies
 from robomesh.schemas.robomesh_pb2 import ServiceHealth
 from robomesh.service.clock import Clock, Reading, hops_of, read_clock, reading_of
-from robomesh.service.health import Served, health_of, own_version, present
+from robomesh.service.health import Served, health_of, listen_when_possible, own_version, present
 from robomesh.service.loop_turns import LONG_S, MeasuredLoop
 from robomesh.service.metrics import SessionMetrics, serve_metrics
 from robomesh.wire.session import open_session
@@ -164,6 +165,19 @@ async def test_a_service_without_its_metrics_runs_and_says_so_and_listens_when_i
             while measured().problems:
                 await asyncio.sleep(0.02)
             assert await asyncio.to_thread(scrape, f"http://127.0.0.1:{port}/metrics")
+
+
+async def test_a_host_that_cannot_be_found_is_reported_in_the_resolver_s_words(monkeypatch):
+    monkeypatch.setattr("robomesh.service.health._LISTEN_AGAIN_S", 0.0)
+    process = SimpleNamespace(problems={})
+
+    async def listen():
+        if not process.problems:
+            raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+        return process.problems["metrics"].text
+
+    text = await listen_when_possible(process, "metrics", "nowhere", 9, listen)
+    assert "cannot listen on nowhere:9: [Errno -2] Name or service not known" in text
 
 
 async def test_only_the_process_that_is_asked_answers_for_its_clock(mesh):
