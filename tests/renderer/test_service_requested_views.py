@@ -25,8 +25,8 @@ BESIDE = View(
 )
 
 
-async def ask(monitor, asker="li", **fields):
-    answer = await monitor.ask(f"{ARM}/views/{asker}", ViewRequest(**fields), timeout_s=40.0)
+async def ask(monitor, asker="li", timeout_s=40.0, **fields):
+    answer = await monitor.ask(f"{ARM}/views/{asker}", ViewRequest(**fields), timeout_s=timeout_s)
     assert isinstance(answer, ViewAnswer)
     return answer
 
@@ -109,7 +109,8 @@ async def test_an_invalid_request_is_rejected_and_does_not_affect_others(mesh, t
         mine = await ask(monitor, of="top", width=240, height=200)
         assert await ask(monitor, of="top", width=240, height=200) == mine
         with pytest.raises(QuotaError, match="no capacity: li already has 1 views: quota views = 1"):
-            await ask(monitor, of="left", width=240, height=200)
+            # A longer request would wait until the other view, which nobody watches, has ended.
+            await ask(monitor, of="left", width=240, height=200, timeout_s=3.0)
         await ask(monitor, "wang", of="left", width=240, height=200)
         key = f"{ARM}/video/front/keyframe"
         while not (await monitor.ask(f"{key}/li", KeyFrameRequest())).forced:

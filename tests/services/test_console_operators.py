@@ -68,7 +68,7 @@ async def test_a_page_that_is_refused_or_gives_control_back_is_not_present(mesh,
 
 async def test_no_operator_is_present_at_a_robot_that_does_not_answer(mesh, page):
     async with console(mesh, page) as (address, other), browse(address) as browser:
-        answer = await browser.ask(1, KEY, asked(ACTION.ACQUIRE))
+        answer = await browser.ask(1, KEY, asked(ACTION.ACQUIRE), timeout_s=2.0)
         assert (answer.ok, answer.no_answer) == (False, True)
         await until_present(other)
 
