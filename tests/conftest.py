@@ -6,7 +6,7 @@ import inspect
 import logging
 import sys
 from collections import Counter
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -48,6 +48,12 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     arguments = inspect.signature(pyfuncitem.obj).parameters
     run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in arguments}), timeout_s=240.0)
     return True
+
+
+def rest_is_long(count: int, values: Iterable[Any]) -> list[Any]:
+    """Return a test's parameters; those after the first `count` belong to `./dev test --long`."""
+    marks = ([], [pytest.mark.long])
+    return [pytest.param(each, marks=marks[at >= count]) for at, each in enumerate(values)]
 
 
 async def last_value(session: Session, key: str) -> Any:

@@ -9,6 +9,7 @@ import sys
 import psutil
 import pytest
 
+from tests.conftest import rest_is_long
 from tests.patience import be_patient
 from tests.protocol_gateway.gateway_site import STATE, gateway, simulator, until
 from tests.robomesh.forking_script import WAYS
@@ -42,7 +43,7 @@ def children(lines):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", [way for way in WAYS if way != "use"])
+@pytest.mark.parametrize("way", rest_is_long(4, (way for way in WAYS if way != "use")))
 async def test_a_killed_program_loses_control_at_once_while_its_child_lives(mesh, tmp_path, way):
     async with (
         simulator() as port,

@@ -91,7 +91,7 @@ async def refusals(session, error):
     server = session.answer("site", "arm", "stop", refuse)
     try:
         with pytest.raises(RefusedError) as refused:
-            await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=40)
+            await session.ask("robomesh/site/arm/stop", schema.StopRequest(), timeout_s=5)
     finally:
         server.close()
     return refused.value

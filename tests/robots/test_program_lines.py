@@ -1,5 +1,7 @@
 """Lines of the tool as joint moves: within the tolerance everywhere, or refused with a reason."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from trimesh.transformations import euler_matrix, rotation_from_matrix
@@ -15,13 +17,16 @@ from robots.programs.steps import LINE_DEG, LINE_M, StepKind, ViolationKind
 from robots.programs.text import parse_program
 from tests.robots.boxes import cell_of, placed
 
-ARMS = {name: build_cell(cell_of({name: (name, placed(0))})).arms[name] for name in ("pt600", "puma560")}
-SOLVERS = {name: build_solver(arm.description) for name, arm in ARMS.items()}
+
+@cache
+def arm_of(robot: str):
+    return build_cell(cell_of({robot: (robot, placed(0))})).arms[robot]
 
 
 def planned(robot: str, text: str):
-    arm = ARMS[robot]
-    return plan_program(parse_program(text, arm.joints), arm, SOLVERS[robot], arm.joints.home.copy())
+    arm = arm_of(robot)
+    solver = build_solver(arm.description)
+    return plan_program(parse_program(text, arm.joints), arm, solver, arm.joints.home.copy())
 
 
 @pytest.mark.parametrize(
@@ -34,14 +39,14 @@ def planned(robot: str, text: str):
     ],
 )
 def test_tool_stays_within_tolerance_of_the_line_and_arrives(robot: str, taught: str, line: str) -> None:
-    model, task = ARMS[robot].model, natural_task(ARMS[robot].joints)
+    model, task = arm_of(robot).model, natural_task(arm_of(robot).joints)
     plan = planned(robot, f"{taught}\n{line}\n")
     assert not plan.violations
     assert not plan.notes
     before = [step for step in plan.steps if step.line == 1][-1].target
     parts = [step for step in plan.steps if step.line == 2]
     assert all(step.kind is StepKind.MOVE and step.along_line for step in parts)
-    wanted = parse_program(line, ARMS[robot].joints).statements[0].target.tool_to_base
+    wanted = parse_program(line, arm_of(robot).joints).statements[0].target.tool_to_base
     way = line_to(tool_placement(model, before), wanted, task)
     at = before
     for step in parts:
@@ -112,7 +117,9 @@ def test_a_step_moves_and_turns_the_tool_along_the_axes_of_its_frame(frame: str)
     base_to_site = euler_matrix(*np.radians([20, -10, 135]))
     arm = build_cell(cell_of({"puma560": ("puma560", base_to_site)})).arms["puma560"]
     text = f"move_joints 0 -30 150 0 50 0\nmove_line_by {frame} 10 -20 30 5 -4 3\n"
-    plan = plan_program(parse_program(text, arm.joints), arm, SOLVERS["puma560"], arm.joints.home.copy())
+    plan = plan_program(
+        parse_program(text, arm.joints), arm, build_solver(arm.description), arm.joints.home.copy()
+    )
     assert not plan.violations
     before, after = (
         tool_placement(arm.model, [step for step in plan.steps if step.line == line][-1].target)
@@ -131,7 +138,7 @@ def test_five_joints_move_by_a_step_and_turn_only_as_they_can() -> None:
     plan = planned("pt600", f"{there} 0 60 0 0 0 0\n")
     assert not plan.violations
     before, after = (
-        tool_placement(ARMS["pt600"].model, [step for step in plan.steps if step.line == line][-1].target)
+        tool_placement(arm_of("pt600").model, [step for step in plan.steps if step.line == line][-1].target)
         for line in (1, 2)
     )
     assert after[:3, 3] - before[:3, 3] == pytest.approx([0, 0.06, 0], abs=1e-5)

@@ -25,6 +25,7 @@ from robots.shapes.solids import ball
 from services.command_line.main import run
 from services.kinematics.worker.messages import CheckQuestion
 from services.kinematics.worker.worker import begin
+from tests.conftest import rest_is_long
 
 REAL = Path(__file__).parents[3] / "shared" / "testdata" / "urdf" / "abb_irb2400_support"
 # Studies run in separate processes.
@@ -172,8 +173,8 @@ def test_a_study_is_made_once_for_the_same_content(
 
 @pytest.mark.parametrize(
     "damaged",
-    ["", "[", "5", "[]", '[["apart"]]', '[["apart", null]]', '[["nothing", 0.0]]'],
-    ids=["empty", "cut off", "a number", "too few", "too short", "no share", "no kind"],
+    rest_is_long(2, ("", '[["nothing", 0.0]]', "[", "5", "[]", '[["apart"]]', '[["apart", null]]')),
+    ids=["empty", "no kind", "cut off", "a number", "too few", "too short", "no share"],
 )
 def test_a_damaged_result_of_a_study_is_replaced(tmp_path: Path, own_cache: Path, damaged: str) -> None:
     model = hollow(tmp_path)

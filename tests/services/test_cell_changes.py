@@ -22,7 +22,7 @@ from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from services.cells.file import CellFile
 from services.kinematics.shown_cell import ShownCell
-from tests.conftest import last_value, run
+from tests.conftest import last_value, rest_is_long, run
 from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import A, C, GatewaySite, kept_control, until
 from tests.refusals import refused
@@ -259,14 +259,14 @@ ShownCell._made = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
 """
 KILLS = {
     "gateway before the file is saved": ("gateway", BEFORE_SAVE, "old"),
+    "kinematics while it prepares the change": ("kinematics", WHILE_PREPARING, "either"),
     "gateway after the file is saved": ("gateway", AFTER_SAVE, "new"),
     "kinematics before it shows the change": ("kinematics", BEFORE_SHOWN, "either"),
-    "kinematics while it prepares the change": ("kinematics", WHILE_PREPARING, "either"),
 }
 
 
 @pytest.mark.processes
-@pytest.mark.parametrize("name", KILLS)
+@pytest.mark.parametrize("name", rest_is_long(2, KILLS))
 def test_after_a_kill_all_agree(mesh, tmp_path, name):
     victim, patch, outcome = KILLS[name]
     path = write_site(tmp_path)

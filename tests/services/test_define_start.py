@@ -151,6 +151,7 @@ def test_a_half_edited_file_ends_nothing(site, page, mine):
     file.write_text(text)
 
 
+@pytest.mark.long
 def test_a_robot_that_cannot_start_stops_nothing_and_starts_when_it_is_mended(site, page, mine):
     broken = site.folder / "robots" / "broken" / "robot.toml"
     broken.parent.mkdir()

@@ -5,6 +5,7 @@ import math
 import struct
 import sys
 from collections import defaultdict
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from robots.kinematics.model import build_model, link_placements
 from services.command_line.main import run
 from tests.recordings import START_NS, Written, joints, write_recording, write_swinging_arm
 
-chunk = pytest.importorskip("rerun.chunk")
+pytestmark = pytest.mark.skipif(find_spec("rerun") is None, reason="rerun is not installed")
 
 y_to_z_up = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 GLB_JSON, GLB_BINARY = 0x4E4F534A, 0x004E4942
@@ -35,8 +36,10 @@ def export(source, out, *options):
 
 def content(path):
     """Return the values by entity and component, without the lists around single values."""
+    from rerun.chunk import RrdReader  # takes half a second, in each worker
+
     found = defaultdict(lambda: defaultdict(list))
-    for each in chunk.RrdReader(str(path)).stream():
+    for each in RrdReader(str(path)).stream():
         batch = each.to_record_batch()
         for name in batch.schema.names:
             column = batch.column(name)

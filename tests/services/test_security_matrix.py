@@ -15,6 +15,7 @@ from robomesh.contract.topics import PEOPLE, REQUESTS, SERVICES, TOPICS, Role
 from robomesh.errors import KeyNameError
 from services.pki import Folder, site_keys
 from services.router.router import read_access
+from tests.conftest import rest_is_long
 from tests.ports import free_port
 from tests.site import wait_until
 
@@ -258,7 +259,7 @@ def test_each_role_makes_only_its_requests_in_its_own_name(mesh):
 
 # Routers compare each answerer with all others: half as many robots cost a quarter.
 @pytest.mark.slow
-@pytest.mark.parametrize("robots", [ROBOTS[::2], ROBOTS[1::2]])
+@pytest.mark.parametrize("robots", rest_is_long(1, (ROBOTS[::2], ROBOTS[1::2])))
 def test_only_owners_of_a_request_and_publishers_of_a_topic_answer(mesh, robots):
     everybody, witness, gone, _ = mesh
     declared, wanted = [], {}

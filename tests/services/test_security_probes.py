@@ -17,7 +17,7 @@ from robomesh.wire.session import SessionSettings, open_session
 from services.command_line.doctor import security
 from services.pki import Folder, site_keys
 from services.router.router import read_access
-from tests.conftest import run
+from tests.conftest import rest_is_long, run
 from tests.ports import free_port
 
 SITE, ARM = "hall", "robomesh/hall/arm"
@@ -91,7 +91,7 @@ async def doctor_beside_control(folder, endpoint, audit_folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("spoiled", [False, True], ids=["the rules", "a rule added by hand"])
+@pytest.mark.parametrize("spoiled", rest_is_long(1, (False, True)), ids=["the rules", "a rule added by hand"])
 def test_doctor_probes_leases_commands_tokens_and_router_keys_of_a_running_robot(
     folder, tmp_path, capsys, caplog, spoiled
 ):
