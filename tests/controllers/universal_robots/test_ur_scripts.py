@@ -240,6 +240,17 @@ def test_movej_moves_all_joints_in_phase_at_the_speed_of_the_leading_one():
     assert arm.state is RuntimeState.STOPPED
 
 
+@pytest.mark.parametrize("acceleration", [5.0, 0.1])  # the second alone would take 4 s
+def test_a_motion_with_a_time_takes_it(acceleration):
+    arm = Simulated()
+    target = arm.positions + np.array([0.4, 0, 0, 0, 0, 0])
+    arm.send(f"movej({target.tolist()}, a={acceleration}, v=0.1, t=2)")
+    arm.run(1.95)
+    assert 0.0 < target[0] - arm.positions[0] < 0.02
+    arm.run(0.1)
+    assert arm.positions == pytest.approx(target, abs=1e-12)
+
+
 def test_a_thread_that_is_killed_gives_the_arm_to_stopj():
     arm = Simulated()
     start = arm.positions
