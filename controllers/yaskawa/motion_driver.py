@@ -390,10 +390,11 @@ class HsesMotionDriver(HsesDriver):
         moved = here is not None and not near(here, motion.start, self._arrived_within)
         begun = self._motion.phase is Phase.RUNS
         if motion.refused is not None and not (motion.answered or begun or running or moved):
-            if min(asked_s, here_s) <= motion.refused_s:
-                return ()
-            self._motion.leave()
-            return (Report([motion.refused], 0),)
+            if min(asked_s, here_s) > motion.refused_s:
+                self._motion.leave()
+                return (Report([motion.refused], 0),)
+            # Without a newer position it is unknown whether a copy of the motion moves the arm.
+            return self._give_up(hses_codes.STATE_OLD(), now_s) if now_s - here_s > _BLIND_S else ()
         if (problem := _stopped(status)) is not None:
             return self._give_up(problem, now_s)
         if status.second & HELD:

@@ -522,6 +522,7 @@ class Bench:
         after = asked_s >= motion.sent_s
         pending = motion.refused_s < math.inf and not (motion.accepted or motion.begun or moved or running)
         judged = after and not pending
+        waits = after and pending and min(asked_s, self._place_s) <= motion.refused_s
         motion.begun = motion.begun or (judged and bool(running or moved))
         if judged:
             motion.arrived_s = min(motion.arrived_s, self.now_s) if there else math.inf
@@ -533,7 +534,7 @@ class Bench:
             "hses.arm_stopped": judged and bool(second & STOPPED or not servo),
             "hses.held": judged and bool(second & HELD),
             "hses.went_local": judged and not first & REMOTE,
-            "hses.state_old": judged and self.now_s - self._place_s > BLIND_S,
+            "hses.state_old": (judged or waits) and self.now_s - self._place_s > BLIND_S,
             "hses.tool_changed": judged and bool(self._place) and self._tool != motion.tool,
             "hses.other_job": judged and running and self.now_s - motion.arrived_s > OTHERS_S,
             "hses.ended_elsewhere": quiet and motion.begun and self.now_s - motion.quiet_s >= ENDED_S,

@@ -158,6 +158,20 @@ def test_a_motion_that_is_refused_leaves_hold_as_it_was():
     assert stepped.written[-1] == (MOTIONS, MOVE)
 
 
+def test_a_refused_motion_is_given_up_if_no_position_shows_whether_a_copy_of_it_moves_the_arm():
+    stepped = Answered()
+    effects = stepped.driver.command(stepped.driver.prepare(NEAR), stepped.now_s)
+    stepped.do(effects)
+    refused = bytearray(answer(effects[-1].data, b""))
+    refused[25] = 0x1F
+    stepped.pulses = None
+    stepped.do(stepped.driver.received(MOTIONS, bytes(refused), stepped.now_s))
+    stepped.run(0.8)
+    assert stepped.written == [(MOTIONS, MOVE)]
+    stepped.run(0.4)
+    assert stepped.written[1:3] == [(STOP, HOLD), (HSES, HOLD)]
+
+
 def test_a_stop_is_sent_alone():
     with pytest.raises(CommandError, match="alone"):
         Answered().driver.prepare(Stop(), NEAR)
