@@ -45,7 +45,7 @@ SEED = os.environ.get("ROBOMESH_SEED") or str(int(time.time()))
 _FUZZERS = sorted(
     ".".join(each.relative_to(ROOT).with_suffix("").parts) for each in ROOT.glob("tests/**/fuzz_*.py")
 )
-_ENDLESS = f"--inputs 1000000000 --seconds {2400 // len(_FUZZERS)} --seed {SEED} --keep findings"
+_ENDLESS = f"--inputs 1000000000 --seconds {1800 // len(_FUZZERS)} --seed {SEED} --keep findings"
 
 
 @dataclass(frozen=True)
