@@ -5,6 +5,7 @@ import pytest
 from tests.fuzz.hulls_and_triangles import compare
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["pt600", "puma560"])
 def test_hulls_miss_no_collision_that_shapes_show(robot: str) -> None:
     count = compare(robot, 150, seed=5)

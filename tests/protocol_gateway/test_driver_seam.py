@@ -314,6 +314,7 @@ async def test_a_command_before_the_link_runs_is_refused_and_makes_it_connect_wi
     await asyncio.gather(task, return_exceptions=True)
 
 
+@pytest.mark.slow
 async def test_pauses_between_failed_attempts_grow_also_after_a_connection_of_use():
     driver = Driver(started=(Open(READ),), received=(STATE,))
     async with controller() as arm, link(driver, arm.port) as (arm_link, _):

@@ -281,6 +281,7 @@ TABLE = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begin", "happens", "promise"), TABLE)
 @pytest.mark.parametrize("send_error", [CUT, FAULT], ids=["link", "fault"])
 async def test_a_decision_that_fails_breaks_no_promise(clock, begin, happens, promise, send_error):

@@ -123,6 +123,7 @@ def test_any_bytes_are_a_unit_or_are_refused(data):
         assert parse_unit(data)
 
 
+@pytest.mark.slow
 @given(st.text(max_size=60))
 def test_any_text_can_be_made_plain(text):
     plain = plain_text(text)

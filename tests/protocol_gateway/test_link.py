@@ -319,6 +319,7 @@ async def test_an_exception_in_a_callback_ends_the_link():
         await end(writer)
 
 
+@pytest.mark.slow
 async def test_the_rate_is_known_after_a_second_and_0_without_units():
     async with controller() as arm, link(arm.port) as (arm_link, _):
         _, writer = await arm.next()

@@ -25,6 +25,7 @@ def nested(depth: int) -> str:
     return "[" * depth + "]" * depth
 
 
+@pytest.mark.slow
 @given(VALUES)
 def test_values_are_those_of_json(value):
     text = json.dumps([value, "[" * MOST_DEPTH, '{"\\' * MOST_DEPTH], ensure_ascii=False)
@@ -48,6 +49,7 @@ def test_nesting_ends_at_the_same_depth_everywhere():
         loads(nested(900))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [r"\n", r"\"", r"\\", "[],", '{"":[]},', '"[",'])
 def test_the_depth_of_a_long_text_is_found_with_little_memory(part):
     inside = part * 100_000

@@ -217,6 +217,7 @@ def test_nearly_parallel_axes_count_as_parallel_and_the_note_says_by_how_much(tm
     assert 0.0 < float(note.split("up to ")[1].split(" mm")[0]) < 0.02
 
 
+@pytest.mark.slow
 def test_any_chain_is_exact_or_has_a_note(tmp_path: Path) -> None:
     random = np.random.default_rng(13)
     angles = [0.0, 0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, 1.570796, 0.7]

@@ -46,6 +46,7 @@ def test_known_names_include_example_robots() -> None:
         load("pandda")
 
 
+@pytest.mark.slow
 @installed
 @pytest.mark.parametrize("file", FILES)
 def test_every_robot_equals_pinocchios_or_is_refused_with_a_reason(file: str) -> None:
@@ -87,6 +88,7 @@ def compare(model: RobotModel, description: UrdfDescription, other: pinocchio.Mo
             np.testing.assert_allclose(placed[name], data.oMf[frame].homogeneous, atol=1e-12)
 
 
+@pytest.mark.slow
 @installed
 @pytest.mark.parametrize("name", NAMES)
 def test_named_robot_is_complete(name: str) -> None:
@@ -98,6 +100,7 @@ def test_named_robot_is_complete(name: str) -> None:
     assert "example-robot-data" in description.provenance
 
 
+@pytest.mark.slow
 @installed
 @pytest.mark.parametrize("name", NAMES)
 def test_exported_robot_has_the_same_placements(name: str, tmp_path: Path) -> None:
@@ -145,6 +148,7 @@ def test_arms_as_rows_have_the_same_tool_placement(name: str, tmp_path: Path) ->
         )
 
 
+@pytest.mark.slow
 @installed
 @pytest.mark.parametrize("name", ["ur5", "panda"])
 def test_links_of_an_example_robot_have_bodies(name: str, tmp_path: Path) -> None:

@@ -100,6 +100,7 @@ def texts() -> list[tuple[str, str]]:
     return [(name, load(name).text) for name in library_names()] + [("slider", SLIDER), ("two", TWO)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "text"), texts())
 def test_placements_equal_the_dh_product_at_1000_random_positions(name: str, text: str) -> None:
     source = load(name).source if name in library_names() else Path("robot.toml")

@@ -116,6 +116,7 @@ def test_duration_follows_from_way_speed_acceleration_and_jerk():
     assert rate == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     st.floats(-9.0, 1.5).map(lambda exponent: 10.0**exponent),

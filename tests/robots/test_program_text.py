@@ -183,6 +183,7 @@ WORDS = "home move_joints move_line point a = joints pose speed repeat end wait 
 words = st.sampled_from((*WORDS.split(), "\n", "\n", "\r", "\x00"))
 
 
+@pytest.mark.slow
 @settings(max_examples=80)
 @given(st.lists(words, max_size=40).map(" ".join) | st.text(max_size=80))
 def test_any_text_is_a_program_or_gets_problems_with_lines(text: str) -> None:

@@ -94,6 +94,7 @@ def in_millimetres(positions):
     return placement
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "words"),
     [

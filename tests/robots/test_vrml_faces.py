@@ -305,6 +305,7 @@ LARGE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outline", LARGE.values(), ids=LARGE)
 def test_large_concave_face_is_triangulated_with_little_effort(outline: np.ndarray) -> None:
     # The area of a polygon by Gauss's formula.
@@ -349,6 +350,7 @@ def test_slow_faces_of_one_file_share_one_effort_limit(draw: Draw, monkeypatch: 
     assert len([warning for warning in geometry.warnings if "too long to triangulate" in warning]) == 3
 
 
+@pytest.mark.slow
 def test_corners_of_a_file_are_granted_once_however_often_a_proto_draws_them(
     draw: Draw, monkeypatch: pytest.MonkeyPatch
 ) -> None:

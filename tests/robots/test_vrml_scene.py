@@ -266,6 +266,7 @@ def test_proto_without_a_field_of_its_own_has_the_nodes(draw: Draw) -> None:
     assert extent(geometry) == [[-1, -1, -1], [1, 1, 1]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "proto",
     [

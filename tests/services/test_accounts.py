@@ -144,6 +144,7 @@ def test_a_few_words_in_any_language_are_a_password(password):
     assert check_password(password, name="li", site="shanghai") == password
 
 
+@pytest.mark.slow
 def test_a_password_is_kept_as_argon2id_and_only_itself_is_right():
     kept = hash_password(PASSWORD)
     assert kept.startswith("$argon2id$v=19$m=65536,t=3")

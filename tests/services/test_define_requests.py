@@ -438,6 +438,7 @@ async def test_an_abandoned_job_delays_no_other(tmp_path, job):
     await define.close()
 
 
+@pytest.mark.slow
 def test_only_so_many_files_are_taken_at_once(page, monkeypatch):
     monkeypatch.setattr(routes, "_MOST_UPLOADS", 1)
     host, port = page.address.removeprefix("http://").split(":")

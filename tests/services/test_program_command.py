@@ -166,6 +166,7 @@ def test_an_invalid_request_prints_one_line_with_status_2(
     assert capsys.readouterr().err == f"robomesh: {sentence}\n"
 
 
+@pytest.mark.slow
 def test_a_plot_is_png_or_svg(folder: Path, capsys) -> None:
     for name in ("bad", "wrong"):
         assert (

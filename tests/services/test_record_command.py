@@ -82,6 +82,7 @@ def test_a_recording_ended_by_another_client_is_reported(mesh, router, tmp_path,
     assert run(main()).problem == "recording trial was ended by another"
 
 
+@pytest.mark.slow
 def test_a_recording_whose_site_has_gone_ends_after_a_while_and_says_where_to_look(
     tmp_path, capsys, monkeypatch
 ):

@@ -152,6 +152,7 @@ def test_a_file_is_self_contained(recorded):
     assert urdf.find("link/visual/geometry/mesh").get("filename").startswith("data:model/gltf-binary;base64,")
 
 
+@pytest.mark.slow
 def test_rerun_opens_it_with_frames_joints_and_video(recorded):
     chunk = pytest.importorskip("rerun.chunk")
     path, _ = recorded

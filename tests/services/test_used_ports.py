@@ -75,6 +75,7 @@ def test_a_free_port_is_free():
     check_free("the console", "127.0.0.1", 0, "")
 
 
+@pytest.mark.slow
 async def test_a_router_serves_its_other_addresses_while_one_is_not_there_yet(monkeypatch):
     # RFC 5737: no machine has this address.
     late, there = f"tcp/192.0.2.1:{free_port()}", f"tcp/127.0.0.1:{free_port()}"

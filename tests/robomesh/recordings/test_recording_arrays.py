@@ -272,6 +272,7 @@ def _write(path, states, **options):
     return _file(path, lambda writer, channel: _put(writer, channel, states), **options)
 
 
+@pytest.mark.slow
 def test_a_small_file_whose_states_lack_most_joints_does_not_fill_the_memory(tmp_path):
     first = joints(**{f"j{number}": 0.0 for number in range(20_000)})
     path = _write(tmp_path / "wide.mcap", [first, *[joints()] * 50_000], chunk_size=1 << 30)
@@ -385,6 +386,7 @@ def test_a_small_file_whose_chunks_unpack_to_much_is_refused(tmp_path, monkeypat
             recover(tmp_path / "cut.mcap")
 
 
+@pytest.mark.slow
 def test_many_messages_of_a_small_chunk_do_not_wait_in_memory(tmp_path, monkeypatch):
     monkeypatch.setattr("robomesh.recordings.reading._MOST_WAITING_BYTES", 1 << 20)
     path = _write(tmp_path / "many.mcap", [b""] * 100_000)
