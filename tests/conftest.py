@@ -72,9 +72,12 @@ def put_unheard(publisher: Publisher, message: Message) -> None:
 
 @pytest.fixture(autouse=True)
 def _log_levels() -> Iterator[None]:
-    """Restore the log levels that a command in the test's process changed."""
+    """Restore the log levels and handlers that a command in the test's process changed."""
     levels = [(logger, logger.level) for logger in (logging.root, logging.getLogger("robomesh"))]
+    handlers = [*logging.root.handlers]
     yield
+    for handler in {*logging.root.handlers} - {*handlers}:
+        logging.root.removeHandler(handler)
     for logger, level in levels:
         logger.setLevel(level)
 
