@@ -1,4 +1,6 @@
-"""`robomesh up` with only the services that a test needs, whose simulated controllers send states seldom.
+"""`robomesh up` with only the services that a test needs, for a machine that is busy with other tests.
+
+Its simulated controllers send states seldom, and its gateway is patient.
 
 TEST_SERVICES=recorder,store TEST_RATE_HZ=25 python -P tests/lean_up.py robomesh up SITE.toml
 """
@@ -10,6 +12,7 @@ from dataclasses import replace
 from services.command_line.main import main
 from services.command_line.service_settings.table import SERVICES
 from services.command_line.site import up
+from tests.patience import be_patient
 
 
 def leave_out(needed: set[str]) -> None:
@@ -33,4 +36,5 @@ if __name__ == "__main__":
     sys.argv[:2] = [sys.argv[1]]
     leave_out({*os.environ["TEST_SERVICES"].split(",")})
     slow_down(float(os.environ["TEST_RATE_HZ"]))
+    be_patient()
     main()

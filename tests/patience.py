@@ -14,7 +14,7 @@ _WAITS = (
 PATIENCE_S = 30.0
 # Of an old client's command: a deadline, which must not be more than 5 s away.
 _LEGACY_WAIT_S = 4.0
-# Of pages and programs, which take leases of 2 s to 5 s. Some tests wait for the end of one.
+# Of pages and programs, which take leases of 2 s to 5 s, and of links. Some tests wait for the end of one.
 LEAST_LEASE_S = 10.0
 
 Put = Callable[[object, str, float], None]
@@ -29,6 +29,7 @@ def wait_patiently(put: Put) -> None:
 
 
 def be_patient(put: Put = setattr) -> None:
-    """Let commands wait for `PATIENCE_S`, and each lease last for `LEAST_LEASE_S`."""
+    """Let commands wait for `PATIENCE_S`, and each lease, also of links, last for `LEAST_LEASE_S`."""
     wait_patiently(put)
+    put(importlib.import_module("robomesh.contract.endpoints"), "LINK_LEASE_MS", round(LEAST_LEASE_S * 1e3))
     put(importlib.import_module(f"{_GATEWAY}.authority.lease_rules"), "SHORTEST_TTL_S", LEAST_LEASE_S)

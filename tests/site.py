@@ -96,6 +96,7 @@ ONE_ARM = """
 name = "arm"
 model = "pt600"
 demo = true
+stale_after_s = 5.0  # a busy machine stands still for seconds
 """
 
 

@@ -14,6 +14,9 @@ from robomesh.contract.topics import Priority
 from robomesh.errors import SessionError
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
+# A host that is silent for this long is gone, and control of its operators ends. It detects a frozen host
+# after 1.7 s; Zenoh's default after 10 s.
+LINK_LEASE_MS = 2000
 
 _LINKS = ("1-4", "5-7")
 ON_THE_SECOND_LINK = (Priority.DATA, Priority.DATA_LOW, Priority.BACKGROUND)
@@ -222,8 +225,7 @@ def _shared(tls: Tls | None) -> dict[str, Any]:
         "transport/unicast/max_links": 4,
         # Limits the wait for a listener that is not a router; the default is 10 s a link.
         "transport/unicast/open_timeout": 3000,
-        # Detects a frozen host after 1.7 s; with the default after 10 s.
-        "transport/link/tx/lease": 2000,
+        "transport/link/tx/lease": LINK_LEASE_MS,
         # No gain at the message sizes of this mesh, and not available in containers.
         "transport/shared_memory/enabled": False,
     }

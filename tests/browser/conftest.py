@@ -27,6 +27,7 @@ from services.console.websocket import shared_subscriptions
 from services.kinematics import kinematics
 from services.watch import watch
 from tests.cells import single_arm
+from tests.patience import be_patient
 from tests.ports import free_port
 from web import build_page
 
@@ -73,6 +74,7 @@ class Plant:
         address: Address of the console.
         endpoint: Endpoint of the router.
         rate_hz: States a second of each arm: as smooth to the eye as the 100 of real ones, and cheaper.
+        exact_leases: Leases last as long as the page asks; otherwise 10 s, for a busy machine.
         session: The tests' session on the mesh; use it in the plant's thread, by `call`.
     """
 
@@ -83,6 +85,7 @@ class Plant:
     rate_hz: float = 25.0
     address: str = ""
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
+    exact_leases: bool = False
     loop: asyncio.AbstractEventLoop = field(init=False)
     session: Session | None = None
     controllers: dict = field(default_factory=dict)
@@ -91,7 +94,7 @@ class Plant:
 
     def call(self, work):
         """Run a coroutine in the plant's thread and return its result."""
-        return asyncio.run_coroutine_threadsafe(work, self.loop).result(20)
+        return asyncio.run_coroutine_threadsafe(work, self.loop).result(60)
 
     @contextmanager
     def standing_still(self):
@@ -152,6 +155,8 @@ class Plant:
                                         host="127.0.0.1",
                                         port=self.controllers[name][1],
                                         stop_proven=True,
+                                        stale_after_s=5.0,  # a busy machine stands still for seconds
+                                        reconnect_after_s=10.0,
                                     )
                                     for name in self.robots
                                 ),
@@ -207,11 +212,11 @@ class Plant:
 def plant(request, tmp_path_factory) -> Iterator[Plant]:
     """Yield a site `hall` of two arms among a module's FIXTURES: `arm` rests, `pt600` moves.
 
-    If a module sets ROBOTS, the site has only those robots.
+    If a module sets ROBOTS, the site has only those robots; with EXACT_LEASES, leases are as short as asked.
     """
     of_module = {
         name: getattr(request.module, name.upper())
-        for name in ("fixtures", "robots")
+        for name in ("fixtures", "robots", "exact_leases")
         if hasattr(request.module, name.upper())
     }
     yield from run_plant(Plant(audit=tmp_path_factory.mktemp("audit"), **of_module))
@@ -223,14 +228,17 @@ def run_plant(running: Plant) -> Iterator[Plant]:
     shared_subscriptions._LINGER_S = 0.0
     build_page.build()
     thread = threading.Thread(target=running.run, name="plant")
-    thread.start()
-    try:
-        running.wait_started()
-        yield running
-    finally:
-        if running.address:
-            running.end()
-        thread.join(20)
+    with pytest.MonkeyPatch.context() as patched:
+        if not running.exact_leases:
+            be_patient(patched.setattr)
+        thread.start()
+        try:
+            running.wait_started()
+            yield running
+        finally:
+            if running.address:
+                running.end()
+            thread.join(60)
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -280,7 +288,7 @@ class Contexts:
 
         try:
             for page in context.pages:
-                page.goto("about:blank", timeout=10_000)  # nothing is written after it was forgotten
+                page.goto("about:blank", timeout=60_000)  # nothing is written after it was forgotten
             kept = context.new_cdp_session(context.pages[0])
             kept.send("Storage.clearDataForOrigin", {"origin": address, "storageTypes": "all"})
             for page in context.pages:
@@ -347,7 +355,7 @@ def raised(plant, tmp_path_factory):
 
     async def start():
         task = plant.loop.create_task(watch.serve(plant.session, watch.Settings(site="hall", folder=folder)))
-        assert await plant.session.last(f"robomesh/hall/{WHOLE_SITE}/alarms", timeout_s=15) is not None
+        assert await plant.session.last(f"robomesh/hall/{WHOLE_SITE}/alarms", timeout_s=40) is not None
         return task, plant.session.declare_publisher("hall", "arm", "events/recorder")
 
     async def end(task):

@@ -18,6 +18,7 @@ from tests.browser.robot_page import (
 pytestmark = pytest.mark.browser
 
 ROBOTS = ("arm",)
+EXACT_LEASES = True
 
 
 @pytest.mark.long

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import robomesh
+from tests.patience import be_patient
 from tests.site import running_site
 
 pytestmark = pytest.mark.processes
@@ -30,7 +31,8 @@ def site(tmp_path_factory):
 
 
 @pytest.fixture
-def mesh(site):
+def mesh(site, monkeypatch):
+    be_patient(monkeypatch.setattr)
     with robomesh.connect(site.router, timeout_s=20.0) as connected:
         yield connected
 
