@@ -2,6 +2,7 @@
 
 import tomllib
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as Xml
 
 import numpy as np
@@ -75,9 +76,8 @@ def translation(x: float, y: float, z: float) -> np.ndarray:
     return matrix
 
 
-def dh_product(text: str, positions: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Return every link's placement and the tool's, computed only from the file's text."""
-    values = tomllib.loads(text)
+def dh_product(values: dict[str, Any], positions: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """Return every link's placement and the tool's, computed only from the file's values."""
     placement = np.eye(4)
     links = [placement]
     for row, position in zip(values["joint"], positions, strict=True):
@@ -105,12 +105,13 @@ def texts() -> list[tuple[str, str]]:
 def test_placements_equal_the_dh_product_at_1000_random_positions(name: str, text: str) -> None:
     source = load(name).source if name in library_names() else Path("robot.toml")
     model = build_model(parse(text, source))
-    generator = np.random.default_rng(7)
-    for _ in range(1000):
-        positions = generator.uniform(model.joints.lower, model.joints.upper)
-        links, tool = dh_product(text, positions)
-        np.testing.assert_allclose(link_placements(model, positions), links, atol=1e-12, rtol=0)
-        np.testing.assert_allclose(tool_placement(model, positions), tool, atol=1e-12, rtol=0)
+    generator, values = np.random.default_rng(7), tomllib.loads(text)
+    random = generator.uniform(model.joints.lower, model.joints.upper, (1000, len(model.joints)))
+    links, tools = zip(*(dh_product(values, positions) for positions in random), strict=True)
+    found = [link_placements(model, positions) for positions in random]
+    np.testing.assert_allclose(found, links, atol=1e-12, rtol=0)
+    found = [tool_placement(model, positions) for positions in random]
+    np.testing.assert_allclose(found, tools, atol=1e-12, rtol=0)
 
 
 @pytest.mark.parametrize(
