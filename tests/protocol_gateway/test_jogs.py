@@ -313,6 +313,8 @@ async def ended(site):
 
 async def test_a_jog_ends_at_a_limit_and_before_an_obstacle(mesh, tmp_path):
     async with jog_site(mesh, tmp_path, check="require", cell=one_robot_cell(POST)) as site:
+        # After a jog, the gateway sets the speed that the operator has chosen.
+        await site.command(C.SPEED, speed_percent=100)
         near = [radians(-149), *REST[1:]]
         await moved_to(site, near)
         end = await to_its_end(site, jog=J(frame=J.JOINT, joint=1, speed=-0.2))
