@@ -34,7 +34,7 @@ from robots.shapes.normals import creased
 from robots.shapes.solids import box
 from tests.fuzz.fuzzing import Finding, keep, options
 
-TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata"
+FILES = Path(__file__).resolve().parents[1] / "robots" / "files"
 SECONDS_AN_INPUT = 10
 MEMORY = 3 << 30
 # Larger ones are cut to this: a changed byte deep in a large file says no more than in a small one.
@@ -212,13 +212,13 @@ def _small(paths: Iterator[Path]) -> Iterator[bytes]:
 
 def _three_ds_corpus() -> Iterator[bytes]:
     yield write_3ds(_box())
-    yield from _small((TESTDATA / "3ds").glob("*.3[dD][sS]"))
+    yield from _small((FILES / "3ds").glob("*.3[dD][sS]"))
 
 
 def _vrml_corpus() -> Iterator[bytes]:
     yield write_vrml(_box()).encode()
     yield _VRML.encode()
-    yield from _small((TESTDATA / "vrml").rglob("*.wrl"))
+    yield from _small(FILES.rglob("*.wrl"))
 
 
 def _toml_corpus() -> Iterator[bytes]:

@@ -20,8 +20,6 @@ from robots.kinematics.model import (
 from robots.schema.errors import JointCountError
 from tests.robots.arms import allowed_positions, telescope
 
-SHARED = Path(__file__).resolve().parents[2].parent / "shared"
-
 SLIDER = """
 name = "slider"
 [[joint]]
@@ -126,9 +124,7 @@ def test_papers_sample_frame_has_the_papers_tool_placement(
 
 
 def test_puma560_has_the_published_rows() -> None:
-    published = SHARED / "testdata" / "vrml" / "puma560" / "kinematics.xml"
-    if not published.is_file():
-        pytest.skip("the shared test data is not beside the checkout")
+    published = Path(__file__).with_name("files") / "puma560" / "kinematics.xml"
     description = load("puma560")
     rows = Xml.parse(published).getroot().findall(".//revolute")
     assert len(rows) == len(description.joints)

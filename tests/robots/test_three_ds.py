@@ -13,7 +13,6 @@ from robots.shapes.geometry import Geometry, Material, Part, bounds
 from robots.shapes.normals import creased
 from robots.shapes.solids import box
 
-TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata" / "3ds"
 GLASS = Material("glass", (0.2, 0.4, 0.6), (1.0, 1.0, 1.0), shininess=0.5, transparency=0.25)
 
 
@@ -38,9 +37,8 @@ def test_written_file_is_read_back_unchanged(tmp_path: Path) -> None:
     assert (np.einsum("ij,ij->i", facing, part.normals[part.triangles[:, 0]]) > 0).all()
 
 
-@pytest.mark.skipif(not TESTDATA.is_dir(), reason="the shared test data is not beside the checkout")
 def test_transparency_and_names_of_a_real_file_are_read() -> None:
-    geometry = read_3ds(TESTDATA / "cubes_with_alpha.3DS")
+    geometry = read_3ds(Path(__file__).with_name("files") / "3ds" / "cubes_with_alpha.3DS")
     transparent = {part.material.name: part.material.transparency for part in geometry.parts}
     assert transparent["Transparent"] == pytest.approx(0.17)
     assert [part.name for part in geometry.parts] == [f"Quader0{number}" for number in range(1, 6)]

@@ -10,7 +10,7 @@ from robots.schema.errors import ShapeError
 from robots.shapes.files.three_ds.read import read_3ds
 from robots.shapes.geometry import Geometry, bounds
 
-TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata" / "3ds"
+FILES = Path(__file__).with_name("files") / "3ds"
 
 # A tetrahedron, its faces seen from outside.
 CORNERS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -209,11 +209,10 @@ def test_invalid_object_is_rejected_with_the_byte(tmp_path: Path, contents: byte
     assert expected in caught.value.reason
 
 
-@pytest.mark.skipif(not TESTDATA.is_dir(), reason="the shared test data is not beside the checkout")
 @pytest.mark.parametrize("name", ["cubes_with_alpha.3DS", "test1.3ds"])
 def test_key_frames_of_real_files_give_the_local_frames_of_their_shapes(name: str) -> None:
-    data = (TESTDATA / name).read_bytes()
-    nodes = read_3ds(TESTDATA / name).nodes
+    data = (FILES / name).read_bytes()
+    nodes = read_3ds(FILES / name).nodes
     assert nodes
     at = 0
     for node in nodes:

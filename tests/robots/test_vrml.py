@@ -14,7 +14,7 @@ from robots.shapes.files.read import read_geometry
 from robots.shapes.files.vrml.read import read_vrml
 from robots.shapes.geometry import Geometry, bounds
 
-TESTDATA = Path(__file__).resolve().parents[2].parent / "shared" / "testdata"
+FILES = Path(__file__).with_name("files")
 
 Draw = Callable[[str], Geometry]
 
@@ -51,18 +51,13 @@ def test_papers_sample_is_read_with_warnings(tmp_path: Path) -> None:
     )
 
 
-def expected_files(folder: str) -> list[dict[str, object]]:
-    table = TESTDATA / "expected.json"
-    rows = json.loads(table.read_text()) if table.is_file() else []
-    return [row for row in rows if row["file"].startswith(folder)]
-
-
-@pytest.mark.skipif(not TESTDATA.is_dir(), reason="the shared test data is not beside the checkout")
-@pytest.mark.parametrize("expected", expected_files(""), ids=lambda row: str(row["file"]))
+@pytest.mark.parametrize(
+    "expected", json.loads((FILES / "expected.json").read_text("utf-8")), ids=lambda row: str(row["file"])
+)
 def test_real_file_has_the_triangles_and_bounds_that_other_readers_agree_on(
     expected: dict[str, object],
 ) -> None:
-    geometry = read_geometry(TESTDATA / str(expected["file"]))
+    geometry = read_geometry(FILES / str(expected["file"]))
     low, high = bounds(geometry)
     assert geometry.triangle_count == expected["triangles"]
     np.testing.assert_allclose(low, expected["min"], atol=1e-5)

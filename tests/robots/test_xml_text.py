@@ -9,10 +9,8 @@ from robots.kinematics.joints import joints_of
 from robots.schema.errors import DescriptionError, ShapeError
 from robots.schema.xml_text import XmlError, read_xml
 from robots.shapes.files.read import read_geometry
-from tests.conftest import SHARED
 from tests.robots.test_shape_formats import DAE
 
-FIELD = SHARED / "testdata" / "field"
 LATIN = '<?xml version="1.0" encoding="ISO-8859-1"?>\n<robot name="bras_école"/>'
 CHINESE = '<?xml version="1.0" encoding="%s"?>\n<robot name="大臂"/>'
 
@@ -116,14 +114,29 @@ def test_what_a_collada_file_hides_from_the_check_is_not_read(tmp_path):
         read_geometry(path)
 
 
-@pytest.mark.skipif(not FIELD.is_dir(), reason="the reference files (../shared) are not beside this checkout")
 @pytest.mark.parametrize(
-    "name",
-    ["cp1252_comment_declared_utf8", "gbk_declared", "latin1_declared", "utf16_powershell", "doctype",
-     "double_hyphen_comment", "unbound_prefix", "attr_unbound_prefix"],
-)  # fmt: skip
-def test_files_of_the_field_are_read(name):
-    assert len(joints_of(load(FIELD / f"{name}.urdf"))) == 3
+    ("encoding", "declared", "more"),
+    [
+        ("cp1252", ' encoding="utf-8"', "<!-- arm \u2013 version 2, 90° -->"),
+        ("gbk", ' encoding="GB2312"', '<material name="底座"/>'),
+        ("latin-1", ' encoding="ISO-8859-1"', '<material name="école"/>'),
+        ("utf-16", "", ""),
+        ("utf-8", "", "<!-- ------ base ------ -->"),
+        ("utf-8", "", '<gazebo reference="b"><sensor:camera name="cam"/></gazebo>'),
+        ("utf-8", "", '<gazebo><sensor name="dvl" gz:type="dvl"/></gazebo>'),
+    ],
+)
+def test_a_robot_of_the_field_is_read(tmp_path, encoding, declared, more):
+    text = f"""<?xml version="1.0"{declared}?>
+<!DOCTYPE robot>
+<robot name="arm">{more}
+  <link name="a"/><link name="b"/>
+  <joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+</robot>"""
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(text.encode(encoding))
+    assert len(joints_of(load(path))) == 1
 
 
 def test_an_srdf_and_a_urdf_of_a_wrong_encoding_are_named(tmp_path):
