@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -249,21 +250,58 @@ def patient():
     expect.set_options(timeout=PATIENCE_MS)
 
 
-@pytest.fixture(scope="module")
-def chromium(plant):
-    """Yield a headless Chromium that draws 3-D in software; it ends before the site does."""
-    from playwright.sync_api import sync_playwright
+class SharedChromium:
+    """One headless Chromium for all modules of a worker, since each start costs a second of the processor.
 
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
+    It draws 3-D in software. Playwright's event loop is this thread's running loop only within `driven`, so
+    that tests without a browser may run a loop of their own.
+    """
+
+    def __init__(self, playwright):
+        self._launch = partial(
+            playwright.chromium.launch,
             executable_path=str(CHROMIUM),
             args=ARGUMENTS,
             timeout=LAUNCH_MS,
             # In the locale C it opens no file if the path has letters beyond ASCII.
             env={**os.environ, "LC_ALL": "C.UTF-8"},
         )
+        self._browser = self._launch()
+        self._loop = asyncio.get_running_loop()
+        asyncio._set_running_loop(None)
+
+    @contextmanager
+    def driven(self):
+        """Yield the browser, started again if it crashed; close its contexts at the end."""
+        asyncio._set_running_loop(self._loop)
+        try:
+            if not self._browser.is_connected():
+                self._browser = self._launch()
+            yield self._browser
+            for context in self._browser.contexts:
+                context.close()
+        finally:
+            asyncio._set_running_loop(None)
+
+
+@pytest.fixture(scope="session")
+def shared_chromium():
+    """Yield the Chromium of this worker."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        shared = SharedChromium(playwright)
+        yield shared
+        with shared.driven() as browser:
+            browser.close()
+        asyncio._set_running_loop(shared._loop)  # Playwright ends in it
+
+
+@pytest.fixture(scope="module")
+def chromium(plant, shared_chromium):
+    """Yield Chromium; its contexts end before the site does."""
+    with shared_chromium.driven() as browser:
         yield browser
-        browser.close()
 
 
 class Contexts:

@@ -10,7 +10,6 @@ import pytest
 from robots.descriptions.description import load
 from robots.descriptions.urdf.write import to_urdf
 from robots.kinematics.model import build_model, link_placements
-from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS
 from web import build_page
 
 pytestmark = pytest.mark.browser
@@ -56,10 +55,8 @@ def script():
 
 
 @pytest.fixture(scope="module")
-def page():
+def page(shared_chromium):
     """Yield an empty page that has the module at /forward.js."""
-    from playwright.sync_api import sync_playwright
-
     build_page.install()
     forward = script()
 
@@ -72,13 +69,11 @@ def page():
         else:
             route.fulfill(body="<!doctype html>", content_type="text/html")
 
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
+    with shared_chromium.driven() as browser:
         opened = browser.new_page()
         opened.route(f"{ADDRESS}/**", answer)
         opened.goto(f"{ADDRESS}/")
         yield opened
-        browser.close()
 
 
 @pytest.mark.parametrize("robot", ["pt600", "puma560", "gripper"])

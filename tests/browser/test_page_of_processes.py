@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import expect
 
-from tests.browser.conftest import ARGUMENTS, CHROMIUM, LAUNCH_MS, PATIENCE_MS
+from tests.browser.conftest import PATIENCE_MS
 from tests.browser.robot_page import (
     button,
     degrees,
@@ -30,9 +30,8 @@ def site(tmp_path, request):
 
 
 @pytest.mark.parametrize("site", [("recorder", "renderer")], ids=["recorded"], indirect=True)
-def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_recording(site):
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=ARGUMENTS, timeout=LAUNCH_MS)
+def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_recording(site, shared_chromium):
+    with shared_chromium.driven() as browser:
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.set_default_timeout(PATIENCE_MS)
         page.goto(f"{site.console}#/test/arm")
@@ -53,7 +52,6 @@ def test_home_trace_move_and_stop_from_the_page_reach_the_controller_and_the_rec
         sent(page, button(page, "Trace off").click)
         wait_until(lambda: not recordings(site)[0]["open"], what="the recording did not close")
         button(page, "Release").click()
-        browser.close()
     (recording,) = recordings(site)
     counts = {topic["topic"].removeprefix("robomesh/test/arm/"): topic for topic in recording["topics"]}
     assert counts["joints"]["messages"] > 25
