@@ -304,57 +304,36 @@ def chromium(plant, shared_chromium):
         yield browser
 
 
-class Contexts:
-    """Pool of browser contexts, reused after a reset because a new context costs more than a new page."""
+@pytest.fixture
+def new_context(chromium):
+    """Yield a function that makes a browser context, which ends with the test.
 
-    def __init__(self, browser):
-        self._browser = browser
-        self._idle = {}
+    To clear a context for the next test costs more than a new one.
+    """
+    made = []
 
-    def lend(self, **settings):
-        """Return a context without stored data, and the value with which it is given back."""
-        kind = tuple(sorted(settings.items()))
-        if idle := self._idle.get(kind):
-            return idle.pop(), kind
-        context = self._browser.new_context(**{"locale": "en-GB", "color_scheme": "dark", **settings})
+    def new(**settings):
+        context = chromium.new_context(**{"locale": "en-GB", "color_scheme": "dark", **settings})
         context.set_default_timeout(PATIENCE_MS)  # a click waits until nothing moves below it
-        return context, kind
+        made.append(context)
+        return context
 
-    def give_back(self, context, kind, address):
-        """Close its pages and clear its storage; do not reuse a context that cannot be cleared."""
-        from playwright.sync_api import Error
-
-        try:
-            for page in context.pages:
-                page.goto("about:blank", timeout=60_000)  # nothing is written after it was forgotten
-            kept = context.new_cdp_session(context.pages[0])
-            kept.send("Storage.clearDataForOrigin", {"origin": address, "storageTypes": "all"})
-            for page in context.pages:
-                page.close()
-        except (Error, IndexError):
-            context.close()
-        else:
-            self._idle.setdefault(kind, []).append(context)
-
-
-@pytest.fixture(scope="module")
-def contexts(chromium):
-    return Contexts(chromium)
+    yield new
+    for context in made:
+        context.close()
 
 
 @pytest.fixture
-def open_page(contexts, plant):
+def open_page(new_context, plant):
     """Open the page at a robot (or the fleet), and check at the end that no error occurred in it.
 
     `drawn=False`: without 3-D, which the processor draws here, so that several pages at once have time
     to renew their leases. `refused=True`: the console refuses something, which a browser takes for an error.
     """
-    lent, wrong = [], []
+    wrong = []
 
     def open_one(path="", width=1440, height=900, drawn=True, refused=False, **settings):
-        context, kind = contexts.lend(**settings)
-        lent.append((context, kind))
-        page = context.new_page()
+        page = new_context(**settings).new_page()
         page.set_viewport_size({"width": width, "height": height})
         page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
         page.on(
@@ -380,10 +359,7 @@ def open_page(contexts, plant):
         return page
 
     yield open_one
-    found = [*wrong]  # messages about a page's end are no errors
-    for context, kind in lent:
-        contexts.give_back(context, kind, plant.address)
-    assert found == []
+    assert wrong == []
 
 
 @pytest.fixture(scope="module")

@@ -38,11 +38,11 @@ def plant(accounts, tmp_path_factory):
 
 
 @pytest.fixture
-def open_tab(contexts, plant):
+def open_tab(new_context, plant):
     """Yield a function that opens tabs of one browser with shared cookies; check that no error occurs in
     them.
     """
-    context, kind = contexts.lend(ignore_https_errors=True)
+    context = new_context(ignore_https_errors=True)
     wrong = []
 
     def open_one(path=ARM):
@@ -54,9 +54,7 @@ def open_tab(contexts, plant):
         return page
 
     yield open_one
-    found = [*wrong]
-    contexts.give_back(context, kind, plant.address)
-    assert found == []
+    assert wrong == []
 
 
 def sign_in(page, name, password=PASSWORD):
@@ -121,9 +119,8 @@ def test_a_monitor_finds_why_it_has_no_control_and_its_stop_request_works(open_t
     wait_until(lambda: "zhao.hall" in asked_by(plant, "STOP"), what="the audit log does not name zhao.hall")
 
 
-def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(contexts, plant):
-    context, kind = contexts.lend(locale="zh-CN", color_scheme="light", ignore_https_errors=True)
-    page = context.new_page()
+def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(new_context, plant):
+    page = new_context(locale="zh-CN", color_scheme="light", ignore_https_errors=True).new_page()
     page.set_viewport_size({"width": 360, "height": 740})
     page.add_init_script(NO_WEBGL)
     page.goto(plant.address)
@@ -151,4 +148,3 @@ def test_on_a_phone_in_chinese_signing_in_fits_and_has_no_serious_finding(contex
     expect(account(page).get_by_role("status")).to_have_text(
         "未更改：密码太短：请用至少 10 个字符，几个词语即可"
     )
-    contexts.give_back(context, kind, plant.address)
