@@ -84,6 +84,7 @@ listen = ["{router}"]
 listen = "{console}"
 [renderer]
 size = [320, 180]
+fps = 10
 {robots}
 """,
         encoding="utf-8",

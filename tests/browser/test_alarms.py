@@ -22,6 +22,8 @@ from tests.browser.robot_page import (
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = ("arm",)
+
 
 def test_an_arm_that_does_not_heed_its_stop_is_an_alarm_that_nothing_hides(open_page, plant):
     page, phone = open_page(ARM, drawn=False), open_page(ARM, 360, 740, drawn=False, has_touch=True)

@@ -14,6 +14,8 @@ from tests.browser.robot_page import (
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = ("arm",)
+
 # So that the page's clock ticks, and joint states arrive, within each look at it.
 LOOK_MS = 2000
 

@@ -18,6 +18,8 @@ from tests.browser.robot_page import (
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = ("arm",)
+
 # Connections through which nothing passes any more.
 LINE_DEAD, STOPS_DEAD = "sockets.at(-1).dead = true", "stopSockets.at(-1).dead = true"
 DEAD = f"{LINE_DEAD}; {STOPS_DEAD}"

@@ -60,7 +60,8 @@ WANTED = os.environ.get("ROBOMESH_PICTURES") == "1"
 @pytest.fixture
 def rendered(plant, tmp_path):
     """Yield the plant's moving arm, rendered."""
-    with rendering(plant, tmp_path):
+    smaller = {} if WANTED else {"size": (640, 360), "fps": 10, "anti_aliasing": 0}
+    with rendering(plant, tmp_path, **smaller):
         yield
 
 

@@ -13,6 +13,8 @@ from tests.browser.robot_page import (
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = ("arm",)
+
 
 def values(page, plot):
     return page.get_by_role("region", name=f"Plot {plot}").get_by_role("listitem")

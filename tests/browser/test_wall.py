@@ -25,7 +25,7 @@ PIXELS = """
 @pytest.fixture(scope="module")
 def rendered(plant, tmp_path_factory):
     """Yield the plant's moving arm, rendered."""
-    with rendering(plant, tmp_path_factory.mktemp("meshes"), size=(640, 360), anti_aliasing=0):
+    with rendering(plant, tmp_path_factory.mktemp("meshes"), size=(640, 360), fps=10, anti_aliasing=0):
         yield
 
 
