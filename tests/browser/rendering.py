@@ -11,10 +11,12 @@ from renderer.errors import NoEncoderError, NoOpenGLError
 
 @contextmanager
 def rendering(plant, folder, **settings):
-    """Return a renderer in the plant's thread, with meshes in the folder; skip if it cannot draw."""
+    """Return a renderer in the plant's thread; skip if it cannot draw. Its shapes are beside the folder."""
 
     async def start():
-        chosen = service.Settings(site="hall", robots=("pt600",), folder=folder, **settings)
+        chosen = service.Settings(
+            site="hall", robots=("pt600",), folder=folder.parent / "prepared", **settings
+        )
         task = plant.loop.create_task(service.serve(plant.session, chosen))
         await asyncio.wait([task], timeout=1.0)
         if task.done():

@@ -29,7 +29,8 @@ async def renderer_site(mesh, tmp_path, *, arm=None, **settings):
     context_or_skip().release()
     async with open_session(mesh) as robot, open_session(mesh) as drawing, open_session(mesh) as monitor:
         arm = arm or single_arm(simulated=True)
-        wanted = Settings(site="hall", size=SIZE, folder=tmp_path, **settings)
+        # The tests share what is prepared once for each shape, 0.5 s of processor time for an arm.
+        wanted = Settings(site="hall", size=SIZE, folder=tmp_path.parent / "prepared", **settings)
         tasks = [
             asyncio.create_task(kinematics.serve(robot, kinematics.Settings(site="hall", robots=(arm,)))),
             asyncio.create_task(service.serve(drawing, wanted)),

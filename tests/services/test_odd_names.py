@@ -106,7 +106,7 @@ def site_settings(folder: Path) -> dict:
         "watch": (watch.serve, watch.Settings(site=SITE, folder=folder / "watch")),
         "renderer": (
             renderer.service.serve,
-            renderer.service.Settings(site=SITE, size=(160, 90), folder=folder / "views"),
+            renderer.service.Settings(site=SITE, size=(160, 90), folder=folder.parent / "prepared"),
         ),
         "ros2": (ros2.serve, ros2.Settings(site=SITE, shapes=folder / "meshes")),
     }
