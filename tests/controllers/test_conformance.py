@@ -17,7 +17,12 @@ from tests.protocol_gateway.wire import wire
 every_driver = pytest.mark.parametrize("subject", SUBJECTS, ids=str)
 quick_drivers = pytest.mark.parametrize("subject", [each for each in SUBJECTS if not each.slow], ids=str)
 QUICK = {"stale_after_s": 1.5, "reconnect_after_s": 3.0}
-FAULTS = [(subject, fault) for subject in SUBJECTS for fault in subject.faults]
+# A driver that may move a robot reads with the code of the one that only reads.
+FAULTS = [
+    pytest.param(subject, fault, marks=[pytest.mark.long] * subject.name.endswith("-motion"))
+    for subject in SUBJECTS
+    for fault in subject.faults
+]
 
 
 @contextlib.asynccontextmanager
