@@ -66,6 +66,12 @@ def test_number_that_does_not_fit_is_not_known():
         (lambda text: text.replace("-.65", "1e99"), "no axis"),
         (lambda text: text.replace("-89.38", "9" * 40 + ".0"), "no axis"),
         (lambda text: text.replace("Joint   1", "Joint   0"), "wrong order"),
+        (
+            lambda text: text.replace("Joint   6:", "Join  6:").replace(
+                "Frame", "EXTAXS:  1: 9.00\nFrame", 1
+            ),
+            "order",
+        ),
         (lambda text: text.replace("Y:", "Q:"), "no part of a position"),
         (lambda text: text.replace("Y:", "X:"), "wrong order"),
         (lambda text: text * 2, "group 1 is in the file twice"),
