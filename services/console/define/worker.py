@@ -26,6 +26,8 @@ def begin(settings: tuple[Path, Path, int]) -> Callable[[Job], dict[str, Any]]:
     temporary.mkdir()
     os.environ.update(TMPDIR=str(temporary), XDG_CACHE_HOME=str(temporary))
     # Imported after the limit and the environment are set, and before `confine`.
+    import numpy as np
+
     from robomesh import reason_codes as codes
     from robots.schema.errors import DescriptionError, RobotError
     from services.console.common.errors import RefusedRequest
@@ -34,6 +36,8 @@ def begin(settings: tuple[Path, Path, int]) -> Callable[[Job], dict[str, Any]]:
     from services.console.define.store import Store
 
     store = Store(store_folder)
+    # NumPy's library takes its memory at its first use, and ends the process where there is none.
+    np.linalg.inv(np.eye(2))
     confine(store_folder)
 
     def answer(job: Job) -> dict[str, Any]:
