@@ -278,6 +278,12 @@ def archive(files):
     return data.getvalue()
 
 
+def stated(content, size):
+    """Return an archive of one file whose directory states another size of it."""
+    at = content.rindex(b"PK\x01\x02") + 24
+    return content[:at] + size.to_bytes(4, "little") + content[at + 4 :]
+
+
 def unzipped(page, content):
     return page.post("/unzip", {"file": "a.zip", "files": {"a.zip": page.upload(content)}})
 
@@ -307,7 +313,7 @@ def test_a_downloaded_zip_opens_as_the_draft_that_it_was(page):
             "define.zip_too_large",
             "2001 files",
         ),
-        (lambda: archive({"bomb.wrl": bytes(501_000_000)}), "define.zip_too_large", "501 MB"),
+        (lambda: stated(archive({"bomb.wrl": b""}), 501_000_000), "define.zip_too_large", "501 MB"),
     ],
     ids=["empty", "cut", "up", "root", "many", "bomb"],
 )
@@ -320,10 +326,7 @@ def test_a_wrong_zip_is_refused_with_code_and_sentence(page, content, code, word
 
 @pytest.mark.slow
 def test_a_zip_whose_entry_is_larger_than_it_says_is_refused(page):
-    content = bytearray(archive({"a.wrl": b"x" * 5000}))
-    at = content.rindex(b"PK\x01\x02") + 24  # the stated size, in the directory
-    content[at : at + 4] = (10).to_bytes(4, "little")
-    answer = unzipped(page, bytes(content))
+    answer = unzipped(page, stated(archive({"a.wrl": b"x" * 5000}), 10))
     assert answer.status == 422
     assert "is not a readable zip archive" in answer.text
 
