@@ -74,7 +74,7 @@ class Plant:
         console: Settings of the console except its address.
         address: Address of the console.
         endpoint: Endpoint of the router.
-        rate_hz: States a second of each arm: as smooth to the eye as the 100 of real ones, and cheaper.
+        rate_hz: States a second of each arm: enough to see it move, and cheaper than the 100 of real ones.
         exact_leases: Leases last as long as the page asks; otherwise 10 s, for a busy machine.
         session: The tests' session on the mesh; use it in the plant's thread, by `call`.
     """
@@ -83,7 +83,7 @@ class Plant:
     fixtures: tuple[Fixture, ...] = ()
     robots: tuple[str, ...] = ("arm", "pt600")
     console: dict = field(default_factory=dict)
-    rate_hz: float = 25.0
+    rate_hz: float = 10.0
     address: str = ""
     endpoint: str = field(default_factory=lambda: f"tcp/127.0.0.1:{free_port()}")
     exact_leases: bool = False
