@@ -2,7 +2,7 @@
 
 Its simulated controllers send states seldom, and its gateway is patient.
 
-TEST_SERVICES=recorder,store TEST_RATE_HZ=10 python -P tests/lean_up.py robomesh up SITE.toml
+TEST_SERVICES=recorder,store TEST_RATE_HZ=25 python -P tests/lean_up.py robomesh up SITE.toml
 """
 
 import os

@@ -20,8 +20,8 @@ from tests.ports import free_port
 READY_S = 60.0
 PROGRAM = (sys.executable, "-m", "services.command_line.main")
 LEAN_UP = Path(__file__).with_name("lean_up.py")
-# Enough to see it move, and cheaper than the 100 states a second of a real controller.
-RATE_HZ = 10.0
+# As smooth to the eye as the 100 states a second of a real controller, and cheaper.
+RATE_HZ = 25.0
 # Besides router, gateway, kinematics and console, which every site has.
 EVERY_SERVICE = ("recorder", "player", "watch", "renderer", "store")
 

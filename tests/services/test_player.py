@@ -71,8 +71,9 @@ async def test_a_monitor_receives_each_recorded_state_once_with_its_recorded_tim
         seen = session.subscribe(f"robomesh/site/{state.robot}/joints", newest=1000)
         frames = session.subscribe(f"robomesh/site/{state.robot}/frames", newest=1000)
         await ask(session, state, _Ask.PLAY)
-        ended = await until_state(session, state, lambda state: state.position_s == state.duration_s)
-        assert not ended.playing
+        await until_state(
+            session, state, lambda state: state.position_s == state.duration_s and not state.playing
+        )
         samples = []
         async with asyncio.timeout(40):
             async for sample in seen:

@@ -264,11 +264,8 @@ async def test_a_clock_that_is_off_is_measured_and_both_machines_are_named(mesh,
                 assert abs(each.clock_offset_s - offset) <= each.round_trip_s / 2 + 1e-3
         await client.until(lambda: "-:clock.off:host-b" in client.alarms)
         cause = client.alarms["-:clock.off:host-b"].cause
-        assert (cause.code, cause.values["host"], cause.values["seconds"]) == (
-            "clock.ahead",
-            "host-b",
-            "3.0",
-        )
+        assert (cause.code, cause.values["host"]) == ("clock.ahead", "host-b")
+        assert abs(float(cause.values["seconds"]) - 3.0) < 1.0  # half a round trip
         assert cause.values["watch"] in {
             each.host for each in client.mesh.services if each.service == "watch"
         }
