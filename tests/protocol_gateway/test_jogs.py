@@ -196,7 +196,8 @@ async def test_a_jog_is_a_line_never_more_than_10_mm_ahead_with_two_audit_entrie
         ways = [(tool_of(at, elsewhere), tool_of(to, elsewhere)) for at, to in tap.targets]
         ahead = [np.linalg.norm(to[:3, 3] - at[:3, 3]) for at, to in ways]
         assert len(ahead) > 5
-        assert max(ahead) <= 0.0101
+        # A unit's degrees have two decimals, and no joint is farther than 1 m from the tool.
+        assert max(ahead) <= 0.01 + len(REST) * np.radians(0.005)
         begin = tool_of(REST, elsewhere)
         for _, to in ways:
             assert abs(to[:3, 3] - begin[:3, 3])[[0, 2]].max() < 1e-3

@@ -206,6 +206,7 @@ async def test_reset_does_not_clear_a_stop_that_was_just_sent(mesh, tmp_path):
             return not site.controller.HasField("stop")
 
         await until(reset)
+        await until(lambda: any(entry.request == "RESET" for entry in site.seen["audit"]))
         assert len([entry for entry in site.seen["audit"] if entry.request == "STOP"]) == 1
         one.say(b"1#COMMAND*home@")
         await until(lambda: "homing" in one.words)

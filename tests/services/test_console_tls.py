@@ -6,6 +6,7 @@ import json
 import socket
 import ssl
 import warnings
+from asyncio.sslproto import _SSLProtocolTransport
 from contextlib import AsyncExitStack
 
 import pytest
@@ -97,7 +98,15 @@ async def test_a_renewed_certificate_is_taken_up_without_a_restart_and_half_a_on
                 await asyncio.sleep(0.02)
 
 
-async def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, tmp_path):
+async def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, page, tmp_path, monkeypatch):
+    lost, close = [], _SSLProtocolTransport.close
+
+    def closed(transport):
+        lost.append(transport.is_closing())
+        close(transport)
+
+    # A second close takes its protocol from a transport, which then can neither read nor end.
+    monkeypatch.setattr(_SSLProtocolTransport, "close", closed)
     certificate, key = self_signed(tmp_path)
     trusted = ssl.create_default_context(cafile=certificate)
     async with console(mesh, page, tls={"certificate": certificate, "key": key}) as (address, _):
@@ -117,6 +126,8 @@ async def test_a_page_that_closes_and_ends_at_once_leaves_no_socket_open(mesh, p
         warnings.simplefilter("always", ResourceWarning)
         gc.collect()
     assert not unclosed
+    assert lost
+    assert not any(lost)
 
 
 async def test_an_invalid_certificate_is_named(mesh, page, tmp_path):

@@ -93,7 +93,7 @@ class WebSocketTransport(WebSocketsSansIOProtocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Set a smaller write buffer than uvicorn's."""
-        super().connection_made(transport)
+        super().connection_made(cast(asyncio.Transport, _ClosedOnce(transport)))
         cast(asyncio.Transport, transport).set_write_buffer_limits(high=_MOST_WAITING)
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -191,6 +191,20 @@ class WebSocketTransport(WebSocketsSansIOProtocol):
             self.transport.resume_reading()
         else:
             self._schedule_piece()
+
+
+class _ClosedOnce:
+    """A transport that uvicorn may close twice; asyncio's for TLS then has lost what it reads with."""
+
+    def __init__(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = transport
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._transport, name)
+
+    def close(self) -> None:
+        if not self._transport.is_closing():
+            self._transport.close()
 
 
 def transport_of(websocket: WebSocket) -> WebSocketTransport:
