@@ -23,6 +23,8 @@ from tests.ports import free_port
 
 T = TypeVar("T")
 
+gc.disable()  # imports and items are no garbage; `pytest_collection_finish` enables it
+
 # A test must not depend on the machine's speed.
 settings.register_profile("robomesh", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("robomesh")
@@ -113,6 +115,7 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.freeze = gc.unfreeze = lambda: None
+    gc.enable()
 
 
 # ---------------------------------------------------- distribution to workers
