@@ -209,13 +209,13 @@ def assert_strict(program: ModuleType, least: Mapping[str, int]) -> None:
     """Run a program for a short time.
 
     Args:
-        least: How often each of these must happen, at least.
+        least: How often each of these must happen, at least, in 20,000 inputs.
     """
     counts: Counter[str] = Counter()
-    done, finding = program.fuzz(20_000, 3, counts)
+    done, finding = program.fuzz(5_000, 3, counts)
     assert finding is None, finding
-    assert done >= 20_000
-    assert not {each: counts[each] for each, number in least.items() if counts[each] < number}
+    assert done >= 5_000
+    assert not {each: counts[each] for each, number in least.items() if 4 * counts[each] < number}
 
 
 def assert_found(program: ModuleType, problem: str) -> None:

@@ -134,14 +134,17 @@ def test_unit_is_read_from_the_drawing(tmp_path: Path, units: int, unit_m: float
 
 
 @pytest.mark.slow
-def test_nested_blocks_with_millions_of_copies_are_rejected(tmp_path: Path, drawing: Any) -> None:
+def test_nested_blocks_with_millions_of_copies_are_rejected(
+    tmp_path: Path, drawing: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dxf, "MAX_COPIES", 2000)
     drawing.blocks.new("b0").add_3dface(SQUARE)
     for level in range(1, 8):
         block = drawing.blocks.new(f"b{level}")
         for _ in range(20):
             block.add_blockref(f"b{level - 1}", (0, 0))
     drawing.modelspace().add_blockref("b7", (0, 0))
-    with pytest.raises(ShapeError, match="20001 copies of blocks; at most 20000 are read"):
+    with pytest.raises(ShapeError, match="2001 copies of blocks; at most 2000 are read"):
         read(tmp_path, drawing)
 
 

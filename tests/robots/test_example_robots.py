@@ -1,5 +1,6 @@
 """The robots of example-robot-data: each loads with Pinocchio's placements, or is refused with a reason."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +23,15 @@ FOLDER = example_folder()
 installed = pytest.mark.skipif(FOLDER is None, reason="the extra example-robots is not installed")
 FILES = [] if FOLDER is None else sorted(str(path.relative_to(FOLDER)) for path in FOLDER.rglob("*.urdf"))
 NAMES = () if FOLDER is None else tuple(EXAMPLES)
+NAMED = {file: name for name, file in EXAMPLES.items()}
 REFUSED = {
     "alex_description/urdf/alex_psyonic_hands.urdf": "mimic joint 'index_q1': no such movable joint",
     "hector_description/robots/quadrotor_base.urdf": "has no movable joint",
     "iris_description/robots/iris_simple.urdf": "has no movable joint",
     "ur_description/urdf/ur3.urdf": "has no <link>",
 }
+
+loaded = cache(load)
 
 
 def test_error_without_the_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -55,7 +59,7 @@ def test_every_robot_equals_pinocchios_or_is_refused_with_a_reason(file: str) ->
         with pytest.raises(DescriptionError, match=REFUSED[file]):
             load(FOLDER / file)
         return
-    description = load(FOLDER / file)
+    description = loaded(NAMED.get(file, FOLDER / file))
     assert isinstance(description, UrdfDescription)
     model = build_model(description)
     compare(model, description, pinocchio.buildModelFromXML((FOLDER / file).read_text()))
@@ -92,7 +96,7 @@ def compare(model: RobotModel, description: UrdfDescription, other: pinocchio.Mo
 @installed
 @pytest.mark.parametrize("name", NAMES)
 def test_named_robot_is_complete(name: str) -> None:
-    description = load(name)
+    description = loaded(name)
     assert isinstance(description, UrdfDescription)
     assert description.robot.missing == ()
     model = build_model(description)
@@ -104,7 +108,7 @@ def test_named_robot_is_complete(name: str) -> None:
 @installed
 @pytest.mark.parametrize("name", NAMES)
 def test_exported_robot_has_the_same_placements(name: str, tmp_path: Path) -> None:
-    description = load(name)
+    description = loaded(name)
     (tmp_path / "again.urdf").write_text(to_urdf(description))
     again = build_model(load(tmp_path / "again.urdf"))
     model = build_model(description)
@@ -126,7 +130,7 @@ def test_exported_robot_has_the_same_placements(name: str, tmp_path: Path) -> No
     "name", ["ur3", "ur5", "ur10", "panda", "xarm7", "z1", "kinova", "so100", "talos_arm"]
 )
 def test_arms_as_rows_have_the_same_tool_placement(name: str, tmp_path: Path) -> None:
-    description = load(name)
+    description = loaded(name)
     assert isinstance(description, UrdfDescription)
     form = dh_form(description)
     rows, problems = from_values(form.values, folder=tmp_path)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from robots.schema.errors import ShapeError
+from robots.shapes.files.vrml import protos
 from robots.shapes.files.vrml.parser import parse_vrml
 from robots.shapes.files.vrml.read import read_vrml
 from robots.shapes.files.vrml.source import load
@@ -278,11 +279,14 @@ def test_proto_without_a_field_of_its_own_has_the_nodes(draw: Draw) -> None:
     ],
     ids=["nodes", "uses", "fields"],
 )
-def test_proto_uses_with_millions_of_nodes_are_rejected(tmp_path: Path, proto: str) -> None:
+def test_proto_uses_with_too_many_nodes_are_rejected(
+    tmp_path: Path, proto: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(protos, "MAX_MADE", 500_000)
     # In another file: all files of a scene count together.
-    write(tmp_path, "part.wrl", f"{proto} {'P { } ' * 1500}")
-    path = write(tmp_path, "a.wrl", f'{proto} {"P {} " * 1500} Inline {{ url "part.wrl" }}')
-    with pytest.raises(ShapeError, match=r"part\.wrl.*PROTOs make more than 5000000 nodes and fields"):
+    write(tmp_path, "part.wrl", f"{proto} {'P { } ' * 150}")
+    path = write(tmp_path, "a.wrl", f'{proto} {"P {} " * 150} Inline {{ url "part.wrl" }}')
+    with pytest.raises(ShapeError, match=r"part\.wrl.*PROTOs make more than 500000 nodes and fields"):
         read_vrml(path)
 
 
