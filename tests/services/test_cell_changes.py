@@ -23,8 +23,7 @@ from robomesh.wire.session import open_session
 from services.cells.file import CellFile
 from services.kinematics.shown_cell import ShownCell
 from tests.conftest import last_value, rest_is_long, run
-from tests.ports import free_port
-from tests.protocol_gateway.gateway_site import A, C, GatewaySite, kept_control, until
+from tests.protocol_gateway.gateway_site import A, C, GatewaySite, kept_control, simulator, until
 from tests.refusals import refused
 from tests.services.cell_site import CellSite, cell_site, write_site
 
@@ -271,23 +270,20 @@ def test_after_a_kill_all_agree(mesh, tmp_path, name):
     victim, patch, outcome = KILLS[name]
     path = write_site(tmp_path)
     path.write_text(f'{path.read_text()}\n[audit]\nfolder = "{tmp_path}/audit"\n')
-    port, (router,) = free_port(), mesh.connect
+    (router,) = mesh.connect
     running = {}
 
-    def start(service, text=""):
+    def start(service, port, text=""):
         more = ("--controller", f"arm=tcp://127.0.0.1:{port}") if service == "gateway" else ()
         code = DIES.format(patch=text)
         words = [sys.executable, "-c", code, service, "--site", str(path), "--connect", router, *more]
         running[service] = subprocess.Popen(words)
 
-    simulated = [sys.executable, "-m", "services.command_line.main", "simulate", "--robot", "pt600"]
-    running["simulator"] = subprocess.Popen([*simulated, "--listen", f"127.0.0.1:{port}"])
-
     async def main():
-        async with open_session(mesh) as session:
+        async with simulator() as port, open_session(mesh) as session:
             site = CellSite(session, path)
             for service in ("gateway", "kinematics"):
-                start(service, patch if service == victim else "")
+                start(service, port, patch if service == victim else "")
             async with watched(site, "controller") as seen:
                 await until(lambda: seen["controller"] and seen["controller"][-1].link == 1, 60.0)
             before = await eventually(site)
@@ -296,7 +292,7 @@ def test_after_a_kill_all_agree(mesh, tmp_path, name):
             if victim == "gateway":
                 # The client's library asks the next gateway again.
                 change.cancel()
-            start(victim)
+            start(victim, port)
             with contextlib.suppress(RobomeshError, asyncio.CancelledError):
                 await change
             after = await eventually(site)

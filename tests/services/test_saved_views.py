@@ -8,27 +8,15 @@ import sys
 import av
 import cv2
 
+from tests import warm
 from tests.conftest import run
 from tests.renderer.renderer_site import moving, picture, renderer_site
 
 
-async def command(mesh, *arguments):
-    return await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "services.command_line.main",
-        *map(str, arguments),
-        "--connect",
-        mesh.connect[0],
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
-
-
 async def done(mesh, *arguments):
-    process = await command(mesh, *arguments)
-    out, err = await process.communicate()
-    return process.returncode, out.decode(), err.decode()
+    words = (*map(str, arguments), "--connect", mesh.connect[0])
+    ended = await asyncio.to_thread(warm.run, words, timeout_s=120.0, text="")
+    return ended.returncode, ended.stdout, ended.stderr
 
 
 def pictures(path):
@@ -43,7 +31,12 @@ def test_a_view_is_saved_as_video_and_picture_and_one_that_there_is_not_says_so(
         async with renderer_site(mesh, tmp_path) as (robot, monitor), moving(robot):
             robot.declare_presence("hall", "arm", "kinematics")
             await picture(monitor)
-            saving = await command(mesh, "video", "arm", "front", video, "--json")
+            saving = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-m", "services.command_line.main"),
+                *("video", "arm", "front", str(video), "--json", "--connect", mesh.connect[0]),
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.PIPE,
+            )
             while not video.exists() or video.stat().st_size < 15_000:
                 await asyncio.sleep(0.05)
             # It plays while it is written.
