@@ -6,7 +6,7 @@ import pytest
 
 from tests.fuzz import fuzz_readers as fuzzer
 
-INPUTS = {"3ds": 600, "wrl": 200, "toml": 150, "glb": 100, "stl": 100, "obj": 60, "ply": 100, "dxf": 30}
+INPUTS = {"3ds": 200, "wrl": 200, "toml": 150, "glb": 100, "stl": 100, "obj": 60, "ply": 100, "dxf": 30}
 
 
 @pytest.mark.parametrize("reader", sorted(INPUTS))

@@ -23,7 +23,7 @@ _MOST, _MOST_ON_AVERAGE = 20.0, 0.8
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     context_or_skip().release()
-    return tmp_path_factory.mktemp("meshes")
+    return tmp_path_factory.getbasetemp() / "prepared"
 
 
 def like_stored(picture, name):
