@@ -16,6 +16,7 @@ from asyncua.server.uaprocessor import UaProcessor
 
 from controllers.opcua.reader import discovery as ids
 from controllers.opcua.units import UNECE, number_of
+from tests.controllers.opcua.standard_nodes import keep_standard_nodes
 
 NODESETS = Path(__file__).parent / "companion"
 NODESET_FILES = ("Opc.Ua.Di.NodeSet2.xml.xz", "Opc.Ua.Robotics.NodeSet2.xml.xz")
@@ -67,6 +68,7 @@ async def companion_server(axes=6, unit=DEGREES, security=None, users=None, devi
     """
     for logger in ("asyncua", "asyncua.common.xmlimporter"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
+    keep_standard_nodes()
     server = Server(user_manager=users) if users else Server()
     await server.init()
     server.set_endpoint("opc.tcp://127.0.0.1:0/cell")

@@ -27,6 +27,7 @@ from protocol_gateway.seam import (
 )
 from protocol_gateway.seam.errors import CommandError, GatewaySettingsError
 from robots.kinematics.joints import JointType
+from tests.controllers.opcua.standard_nodes import keep_standard_nodes
 from tests.controllers.simulated_site import running
 from tests.ports import free_port
 from tests.protocol_gateway.gateway_site import STATE, A, gateway, refusal, until
@@ -444,6 +445,7 @@ async def controller(**settings):
     """Run a simulated controller; yield its port."""
     from controllers.opcua.simulated.service import OpcUaSimulatorSettings, serve_opcua
 
+    keep_standard_nodes()
     settings.setdefault("listen", f"127.0.0.1:{free_port()}")
     async with running(serve_opcua, OpcUaSimulatorSettings(**settings)) as port:
         yield port
