@@ -329,10 +329,11 @@ def open_page(new_context, plant):
 
     `drawn=False`: without 3-D, which the processor draws here, so that several pages at once have time
     to renew their leases. `refused=True`: the console refuses something, which a browser takes for an error.
+    `script`: runs in the page before its own scripts do.
     """
     wrong = []
 
-    def open_one(path="", width=1440, height=900, drawn=True, refused=False, **settings):
+    def open_one(path="", width=1440, height=900, drawn=True, refused=False, script="", **settings):
         page = new_context(**settings).new_page()
         page.set_viewport_size({"width": width, "height": height})
         page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
@@ -355,6 +356,7 @@ def open_page(new_context, plant):
         )
         if not drawn:
             page.add_init_script(NO_WEBGL)
+        page.add_init_script(script)
         page.goto(f"{plant.address}/{path}")
         return page
 

@@ -47,13 +47,8 @@ def alarmed(raised):
 def test_axe_finds_nothing_serious_on_any_page_and_a_chinese_page_is_chinese(
     open_page, alarmed, theme, language
 ):
-    page = open_page(drawn=False)
-    page.evaluate(
-        "([theme, language]) => { localStorage.setItem('robomesh.theme', theme);"
-        " localStorage.setItem('robomesh.language', language) }",
-        [theme, language],
-    )
-    page.reload()
+    kept = f"localStorage['robomesh.theme'] = '{theme}'; localStorage['robomesh.language'] = '{language}';"
+    page = open_page(drawn=False, script=kept)
     page.wait_for_function("language => document.documentElement.lang.startsWith(language)", arg=language)
     assert page.evaluate("document.documentElement.dataset.theme") == theme
     found = {}

@@ -47,9 +47,7 @@ window.WebSocket = class extends WebSocket {
 
 def open_idle(open_page):
     """Open the arm's page with a clock and a connection that the test controls."""
-    page = open_page(ARM, drawn=False)
-    page.add_init_script(WORLD)
-    page.reload()
+    page = open_page(ARM, drawn=False, script=WORLD)
     expect(state_word(page)).to_have_text("Idle")
     return page
 
