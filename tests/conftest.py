@@ -148,7 +148,7 @@ LEFT_OUT = {
     "long": "belong to ./dev test --long",
     "browser": "drive the page in a browser",
     "processes": "start a whole site of processes",
-    "slow": "start processes, or take more than a second",
+    "slow": "start processes, or take more than 0.4 s",
     "router": "exchange messages over a router",
 }
 _left_out: Counter[str] = Counter()
@@ -162,6 +162,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     sys.addaudithook(_no_process)
+    if config.getoption("--quick"):
+        settings.register_profile("quick", settings.get_profile("robomesh"), max_examples=20)
+        settings.load_profile("quick")
 
 
 def _no_process(event: str, arguments: object) -> None:

@@ -1,5 +1,6 @@
 """Random sequences of events: one holder, no motion after a stop, a stop when a lease ends during motion."""
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -198,5 +199,5 @@ class Machine(RuleBasedStateMachine):
         assert all(self.now_s - each.since_ns * 1e-9 < 30.0 for each in self.authority.asked_by)
 
 
-TestAuthorityMachine = Machine.TestCase
+TestAuthorityMachine = pytest.mark.slow(Machine.TestCase)
 TestAuthorityMachine.settings = settings(max_examples=200, stateful_step_count=40)

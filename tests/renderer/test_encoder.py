@@ -106,6 +106,7 @@ def test_at_most_one_key_frame_a_second_is_forced():
     assert made == [0, 30, 60]
 
 
+@pytest.mark.slow
 def test_a_limited_bit_rate_is_kept_for_any_content():
     size, fps, most = (640, 360), 15, 250e3
     noise = np.random.default_rng(0)

@@ -70,6 +70,7 @@ def test_a_cube_has_one_level():
     assert prepared(cube(0.5)).levels.tolist() == [0, 12]
 
 
+@pytest.mark.slow
 def test_a_rough_scan_keeps_its_longest_edges_only():
     positions, triangles = plate(80)
     positions[:, 2] = np.random.default_rng(0).normal(0.0, 0.02, len(positions))

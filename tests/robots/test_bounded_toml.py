@@ -99,6 +99,7 @@ def test_number_with_too_many_digits_is_a_toml_error() -> None:
         parse_toml("a = " + "9" * 5000)
 
 
+@pytest.mark.slow
 def test_thousands_of_wrong_values_are_one_problem(tmp_path: Path) -> None:
     text = 'name = "x"\n' + "[[joint]]\na = 1\n" * 30_000
     assert len(text) < MOST_CHARACTERS

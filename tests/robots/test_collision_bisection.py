@@ -140,6 +140,7 @@ def test_robot_far_from_another_robots_long_path_measures_almost_nothing(
     assert measured < 500
 
 
+@pytest.mark.slow
 def test_repeated_small_motions_never_pass_the_stop_distance() -> None:
     post = block("post", (0.06, 0.06, 1.0), placed(0.0, 0.45, 0.5))
     cell = build_cell(CellDescription((CellRobot("arm", "pt600", np.eye(4)),), (post,)))

@@ -89,6 +89,7 @@ def sampled_path(arm: Arm, path: FloatArray) -> tuple[FloatArray, FloatArray]:
     return placements, travelled(arm.bodies, placements)
 
 
+@pytest.mark.slow
 def test_another_arms_path_counts_as_all_of_its_positions(cell: Cell) -> None:
     # The neighbour passes the arm: at both ends of its path it is far away.
     way = np.radians([[-100.0, 60.0, -60.0, 10.0, 0.0], [100.0, 60.0, -60.0, 10.0, 0.0]])

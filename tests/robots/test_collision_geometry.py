@@ -85,6 +85,7 @@ def test_real_robots_collision_files_are_checked_and_visual_files_drawn() -> Non
 
 
 @needs_real_robots
+@pytest.mark.slow
 def test_a_real_hull_with_a_vertex_of_many_neighbours_is_checked() -> None:
     description = CellDescription((CellRobot("gp8", GP8, np.eye(4)),))
     assert len(build_cell(description).arms["gp8"].bodies) == 7

@@ -105,6 +105,7 @@ def test_failed_conversion_leaves_the_old_file_and_nothing_else(box: Path) -> No
     assert sorted(path.name for path in box.parent.iterdir()) == ["box.wrl", "broken.3ds", "out.stl"]
 
 
+@pytest.mark.slow
 def test_shape_too_large_for_3ds_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     heights = " ".join("0" for _ in range(300 * 300))
     path = tmp_path / "grid.wrl"

@@ -152,6 +152,7 @@ def test_live_clearance_includes_the_floor_only_with_a_warning_distance() -> Non
     "urdf",
     ["abb_irb2400_support/urdf/irb2400_12_155.urdf", "motoman_gp8_support/urdf/gp8.urdf"],
 )
+@pytest.mark.slow
 def test_heights_equal_pinocchios_of_the_same_file(shared: Path, urdf: str) -> None:
     folder = shared / "testdata/urdf"
     path = folder / urdf

@@ -197,6 +197,7 @@ def test_an_arm_of_one_joint_is_solved() -> None:
 
 
 @pytest.mark.parametrize("name", ["puma560", "crooked"])
+@pytest.mark.slow
 def test_same_arguments_give_bit_identical_results(name: str) -> None:
     _, model, solver = arm(name)
     again = build_solver(arm(name)[0])

@@ -207,6 +207,7 @@ def test_no_link_moves_more_than_5_mm_between_samples(pt600: Cell) -> None:
 
 
 @pytest.mark.parametrize("robot", ["pt600", "puma560"])
+@pytest.mark.slow
 def test_vectorized_tools_and_jacobians_equal_pinocchios(robot: str) -> None:
     arm = build_cell(cell_of({"arm": (robot, placed(0.3, 0.2, 0.1))})).arms["arm"]
     chain, random = tool_chain(arm), np.random.default_rng(1)

@@ -38,6 +38,7 @@ def planned(robot: str, text: str):
         ("puma560", "move_line 500 -150 200 180 0 0", "move_line 500 -150 200 150 10 0"),
     ],
 )
+@pytest.mark.slow
 def test_tool_stays_within_tolerance_of_the_line_and_arrives(robot: str, taught: str, line: str) -> None:
     model, task = arm_of(robot).model, natural_task(arm_of(robot).joints)
     plan = planned(robot, f"{taught}\n{line}\n")

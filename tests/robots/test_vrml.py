@@ -125,6 +125,7 @@ def test_uses_of_uses_cannot_exhaust_the_reader(draw: Draw) -> None:
     refused_in_time(draw, "\n".join(["DEF G0 Shape { }", *groups]), "draws more than 200000 nodes")
 
 
+@pytest.mark.slow
 def test_uses_in_a_proto_cannot_exhaust_the_reader(draw: Draw) -> None:
     groups = [f"DEF G{n + 1} Group {{ children [ USE G{n} USE G{n} ] }}" for n in range(60)]
     body = "\n".join(["Group { children [ DEF G0 Transform { translation IS at }", *groups, "] }"])

@@ -101,6 +101,7 @@ def test_a_view_that_was_not_recorded_is_refused(tmp_path, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["trial.mcap"]
 
 
+@pytest.mark.slow
 def test_plots_mark_events(moving, tmp_path):
     out = tmp_path / "out.svg"
     assert run(["recordings", "export", str(moving), str(out)]) == 0

@@ -51,6 +51,7 @@ def content(path):
     return found
 
 
+@pytest.mark.slow
 def test_joints_and_events_are_the_files_on_both_timelines(swinging, tmp_path):
     found = export(swinging, tmp_path / "out.rrd", "--from", "0.5", "--to", "1")
     waist = found["/site/arm/joints/waist/position"]

@@ -58,6 +58,7 @@ def samples(folder):
     return sorted(found.items())
 
 
+@pytest.mark.slow
 def test_each_interval_has_the_lowest_and_highest_value_of_all_files(folder):
     answer = ask(folder, WAIST, "kinematics/own_clearance", start_s=0, end_s=200)
     waist, own = answer.series
@@ -78,6 +79,7 @@ def test_each_interval_has_the_lowest_and_highest_value_of_all_files(folder):
     assert times == sorted(set(times))
 
 
+@pytest.mark.slow
 def test_a_closer_view_of_a_long_recording_has_all_its_points(tmp_path):
     write(tmp_path / "arm" / "long.mcap", 0, 1500, hz=20)
     (waist,) = ask(tmp_path, WAIST, start_s=1000, end_s=1010, points=200).series

@@ -87,6 +87,7 @@ def test_a_table_has_a_column_each_and_nothing_where_they_are_stale(recorded, tm
     assert by_time[7.5] == ["", "", "", ""]
 
 
+@pytest.mark.slow
 def test_rerun_gets_numbers_and_booleans(recorded, tmp_path):
     pytest.importorskip("rerun.chunk")
     from tests.services.test_rerun_export import export

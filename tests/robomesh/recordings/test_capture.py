@@ -80,6 +80,7 @@ def attached_to(path):
         return {each.name: each.data for each in make_reader(stream).iter_attachments()}
 
 
+@pytest.mark.slow
 def test_closed_file_is_complete_and_an_indexed_one_has_the_same_contents(tmp_path):
     path = tmp_path / "a.mcap"
     write(path, range(20_000), missed={JOINTS: 3, EVENTS: 0})

@@ -285,6 +285,7 @@ def test_a_small_file_whose_states_lack_most_joints_does_not_fill_the_memory(tmp
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 def test_a_small_file_that_unpacks_to_much_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("robomesh.client.recordings.recording._MOST_BYTES", 1 << 20)
     monkeypatch.setattr("robomesh.client.recordings.recording._MOST_TIMES_THE_FILE", 0)
@@ -424,6 +425,7 @@ def test_messages_without_bytes_count_too(tmp_path, monkeypatch):
         robomesh.open_recording(path).joints()
 
 
+@pytest.mark.slow
 def test_long_messages_are_not_all_in_memory(tmp_path):
     state = joints(**{"n" * (1 << 20): 1.0})
     path = _write(tmp_path / "long.mcap", [state] * 200)
