@@ -253,7 +253,7 @@ async def test_only_the_holders_new_keep_alives_count(mesh, tmp_path):
             ({"operator": "wu"}, "li is in control"),
             ({"lease": "guessed"}, "control"),
             ({"jog": site.id + 1}, "no jog"),
-            ({"sequence": 1}, "is not new"),
+            ({"sequence": number}, "is not new"),
         ):
             values = {"sequence": number + 1, **fields}
             assert text in await refusal(ask(site, values.pop("sequence"), **values))

@@ -8,6 +8,7 @@ from renderer.pictures.overlay import AMBER, FAINT
 from renderer.pictures.robot_state import Ages, RobotState, current_clearance_line
 from renderer.scene.cameras import Camera, pixels
 from robomesh.schemas.robomesh_pb2 import Clearance, Description, KinematicState, Vector3
+from robots.descriptions.cells import FLOOR
 
 DESCRIPTION = Description(warning_distance=0.05, stop_distance=0.01)
 ASIDE = Camera(np.array([0.0, -3.0, 0.5]), np.array([0.0, 0.0, 0.5]), np.array([0.0, 0.0, 1.0]))
@@ -46,6 +47,16 @@ def test_the_larger_distance_of_two_robots_counts():
     assert line_of(clearance(0.15), [DESCRIPTION, careful]).color == AMBER
     assert line_of(clearance(0.09), [DESCRIPTION, careful]).color == RED
     assert line_of(clearance(0.0001), []).color == FAINT
+
+
+def test_the_floor_has_its_own_distances():
+    site = Description(warning_distance=0.2, stop_distance=0.1)
+    site.floor.warning_distance, site.floor.stop_distance = 0.05, 0.01
+    above = clearance(0.09)
+    above.first, above.second = "arm/wrist", f"site/{FLOOR}"
+    assert line_of(above, [site]).color == FAINT
+    above.second = "arm/column"
+    assert line_of(above, [site]).color == RED
 
 
 def test_the_line_is_drawn_between_its_points_with_its_length():

@@ -6,6 +6,7 @@ import pytest
 from robots.descriptions.description import load
 from robots.kinematics.model import build_model, manipulability, tool_jacobian
 from robots.kinematics.singularity import arm_length, dexterity, singularity_margin
+from robots.schema.robot_toml import Pose
 
 
 def margin(name, degrees):
@@ -16,6 +17,12 @@ def margin(name, degrees):
 def test_the_reach_is_the_arms_length_from_its_first_joint_to_its_tool():
     # Pt600: rows d 0.35, a 0.30, a 0.30; tool 0.12.
     assert arm_length(load("pt600")) == pytest.approx(0.35 + 0.30 + 0.30 + 0.12)
+
+
+def test_the_place_of_the_first_joint_on_the_base_is_no_part_of_the_reach():
+    description = load("pt600")
+    base = description.base.model_copy(update={"pose": Pose(xyz=(0.0, 0.0, 500.0))})
+    assert arm_length(description.model_copy(update={"base": base})) == arm_length(description)
 
 
 @pytest.mark.parametrize(

@@ -168,6 +168,18 @@ def test_copies_in_the_key_frames_cause_a_warning(tmp_path: Path) -> None:
     assert geometry.triangle_count == 4
 
 
+@pytest.mark.parametrize("number", [b"", b"\7", b"\0\0\7"])
+def test_an_objects_number_in_the_key_frames_is_its_first_two_bytes_if_it_has_them(
+    tmp_path: Path, number: bytes
+) -> None:
+    parent = chunk(
+        0xB002, chunk(0xB010, b"$$$DUMMY\0", struct.pack("<3H", 0, 0, 65535)), chunk(0xB030, number)
+    )
+    keyframes = chunk(0xB000, parent, key_object("tetra", 1, 0))
+    geometry = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))
+    assert [node.parent for node in geometry.nodes] == [-1, 0]
+
+
 def test_cyclic_hierarchy_is_omitted_with_a_warning(tmp_path: Path) -> None:
     keyframes = chunk(0xB000, key_object("tetra", 0, 1), key_object("b", 1, 0))
     geometry = read(tmp_path, a_file(an_object(vertices(), faces()), keyframes=keyframes))

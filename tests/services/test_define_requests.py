@@ -95,6 +95,12 @@ def test_a_file_whose_name_leads_elsewhere_is_refused(page, name):
     assert (answer.status, answer.code) == (422, "define.path")
 
 
+@pytest.mark.parametrize("names", [("a", "a/b"), ("a/b", "a")])
+def test_a_file_whose_name_is_anothers_folder_is_refused(page, names):
+    answer = page.post("/check", {"description": {}, "files": dict.fromkeys(names, page.upload(b"x"))})
+    assert (answer.status, answer.code) == (422, "define.file_is_folder")
+
+
 @pytest.mark.slow
 def test_a_shape_is_converted_in_its_own_units(page):
     answer = page.post("/mesh", {"file": "m/a.wrl", "files": {"m/a.wrl": page.upload(TRIANGLE)}}).json

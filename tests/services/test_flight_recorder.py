@@ -4,6 +4,7 @@ import asyncio
 import json
 import threading
 import time
+from types import SimpleNamespace
 
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from mcap.reader import make_reader
@@ -190,6 +191,19 @@ def test_only_old_segments_are_removed(mesh, tmp_path, monkeypatch):
     # 0.6 s in segments of 0.2 s; a busy machine removes them late.
     assert 1 <= run(main()) <= 8
     assert not list(tmp_path.glob(SAVED))
+
+
+async def test_of_too_many_bytes_the_oldest_segments_are_removed(tmp_path):
+    settings = SimpleNamespace(folder=tmp_path, split=SimpleNamespace(mib=1.0))
+    files = SimpleNamespace(settings=settings, robot="arm")
+    recorder = flight.FlightRecorder(files, None, Flight(), on_save=None, report=None)
+    folder = tmp_path / ".flight" / "arm"
+    folder.mkdir(parents=True)
+    for number in range(4):
+        with (folder / f"{number}.mcap").open("wb") as file:
+            file.truncate(400_000)
+    recorder._remove_old()
+    assert sorted(each.name for each in folder.iterdir()) == ["2.mcap", "3.mcap"]
 
 
 async def test_segments_of_a_save_that_is_recording_stay(mesh, tmp_path, monkeypatch):

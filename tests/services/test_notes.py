@@ -203,6 +203,8 @@ async def test_a_note_is_published_listed_and_kept_over_a_restart(mesh, tmp_path
         note = await robot.note("gripper slips", begin, begin + timedelta(seconds=5), author="li")
         event = (await anext(events)).message()
         assert (event.note.id, event.note.author, event.note.text) == (note.id, "li", "gripper slips")
+        with refused(codes.NOTES_AUTHOR):
+            await robot.withdraw_note(note.id, author="wang")
         await robot.withdraw_note(note.id, author="li")
         assert (await anext(events)).message().values["by"] == "li"
     async with stored(mesh, tmp_path) as page, attached(mesh) as robot:

@@ -19,6 +19,7 @@ from controllers.fanuc.rmi.motion_driver import (
 from controllers.fanuc.table import Fanuc
 from protocol_gateway.seam import (
     Activity,
+    FateUnknown,
     FollowsControl,
     Hold,
     JointsReceived,
@@ -189,6 +190,16 @@ def test_an_old_state_and_an_extra_axis_forbid_motion():
     with pytest.raises(NotReadyError) as refused:
         driver.command(driver.prepare(MoveAbsolute(HERE)), 1.0)
     assert refused.value.reason.code == "fanuc.extra_axes"
+
+
+@pytest.mark.parametrize("fresh", [JointsReceived(HERE), IDLE])
+def test_old_positions_or_an_old_status_forbid_the_motion_that_waited_for_its_initialization(fresh):
+    driver = ready()
+    driver.command(driver.prepare(MoveAbsolute(HERE)), 1.0)
+    driver._noted(fresh, 2.4, 2.4)
+    effects = driver.received(SESSION, INITIALIZED, 2.5)
+    assert sent(effects) == [rmi.abort()]
+    assert [each.why.code for each in effects if isinstance(each, FateUnknown)] == ["fanuc.state_old"]
 
 
 @pytest.mark.parametrize(

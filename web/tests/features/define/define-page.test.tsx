@@ -67,6 +67,17 @@ test.each(["1,234", "0x10", ""])("what is no number (%o) stays marked and is not
   expect([checks(), invalid("joint/1/a")]).toEqual([["Nothing is wrong with it."], "false"]);
 });
 
+test("a robot of the list is marked if it has an unsaved draft", async () => {
+  const card = () => texts(".robot-card .dim");
+  await go();
+  expect(card()).toEqual(["library · 5 joints"]);
+  await go("pt500");
+  type(field("joint/1/a"), "260");
+  await pass(2000);
+  await go();
+  expect(card()).toEqual(["library · 5 joints · unsaved draft"]);
+});
+
 const SHAPED = {
   ...robot("own", ["waist"], { base: { mesh: "meshes/base.wrl", mesh_scale: 1 } }),
   files: { "meshes/base.wrl": "b" },

@@ -107,6 +107,16 @@ test("an alarm is shelved for a time with a reason, and comes back when it is as
   expect(read(await nextTo("/alarms/request/li"), AlarmRequestSchema).action).toBe(Action.UNSHELVE);
 });
 
+test("an alarm that the filter hides is not selected", async () => {
+  await alarms(State.ACKNOWLEDGED);
+  type("input[name=operator]", "li");
+  find<HTMLInputElement>('[aria-label="Select: no positions come from it"]').checked = true;
+  send('[aria-label="Select: no positions come from it"]', new Event("change", { bubbles: true }));
+  expect(button("Shelve selected…").disabled).toBe(false);
+  press("Unacknowledged 0");
+  expect([lines(), button("Shelve selected…").disabled]).toEqual([[], true]);
+});
+
 async function happened(more: EventFields = {}): Promise<void> {
   publish("robomesh/hall/arm/events/recorder", EventSchema, {
     ...{ timestamp: at(1), code: "recorder.note", source: "recorder", severity: Severity.INFO, ...more },

@@ -282,6 +282,16 @@ test("a site without a player is named only once its presence would have arrived
   expect([used.result.problem, requests]).toEqual([expect.stringContaining("hall"), []]);
 });
 
+test("the player shows the moment, and the time at which it was recorded", async () => {
+  const { Replay } = await import("../../../src/mesh/services/replay");
+  const { PlaybackControls } = await import("../../../src/features/recordings/player/playback-controls");
+  const { timeText } = await import("../../../src/i18n/format");
+  const { signal } = await import("@preact/signals");
+  const state = create(ReplayStateSchema, { durationS: 100, start: timestampFromMs(1e12) });
+  show(<PlaybackControls replay={new Replay("robomesh/hall/replay-1", state)} moment={signal(65)} events={[]} />);
+  expect(texts(".transport-time > span")).toEqual([timeText(1e12 + 65_000), "01:05.00 / 01:40.00"]);
+});
+
 /** Two replays, the second kept `shift` s ahead; and what the second's player is asked. */
 async function pair(
   first: MessageInitShape<typeof ReplayStateSchema>,

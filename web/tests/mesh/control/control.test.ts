@@ -224,6 +224,12 @@ test("control that the gateway no longer knows is lost with that reason", async 
   expect(state()).toEqual([undefined, expect.stringContaining("the gateway no longer knows of it")]);
 });
 
+test("a newer lease of the same operator is another window's, and ends this one's control", async () => {
+  await hold();
+  published("li", 10);
+  expect(state()).toEqual([undefined, expect.stringMatching(/^Control ended/)]);
+});
+
 test.each([
   ["too slow", { code: "lease.gone", text: "not renewed" }, /too slow/],
   [
