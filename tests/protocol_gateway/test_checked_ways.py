@@ -7,6 +7,7 @@ from math import radians
 
 import pytest
 
+from protocol_gateway.authority.decisions import CheckVerdict
 from protocol_gateway.checking.cell_occupancy import CellOccupancy
 from protocol_gateway.checking.policy import Policy
 from protocol_gateway.execution.motion_checks import MotionChecks
@@ -27,11 +28,10 @@ READY = StatusReceived(activity=Activity.IDLE, mode=Mode.REMOTE, homed=True)
 HERE, FAR, NEAR = (0.0,) * 5, (1.0, 0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.0)
 
 
-def occupied_path(bench):
-    """Return the path that the cell's other robots are checked against."""
-    cell_occupancy = CellOccupancy()
-    MotionChecks(
-        "arm",
+def checks(bench, cell_occupancy, name="arm"):
+    """Return the checks of one of two robots of a cell."""
+    return MotionChecks(
+        name,
         Policy.OFF,
         cell=("arm", "arm-2"),
         checker=None,
@@ -41,6 +41,12 @@ def occupied_path(bench):
         robot_authority=bench.robot_authority,
         controller=bench.controller,
     )
+
+
+def occupied_path(bench):
+    """Return the path that the cell's other robots are checked against."""
+    cell_occupancy = CellOccupancy()
+    checks(bench, cell_occupancy)
     return cell_occupancy.others("arm-2", ("arm", "arm-2"))["arm"].path
 
 
@@ -58,6 +64,18 @@ async def test_a_unit_of_two_motions_occupies_both_paths(tmp_path, second, path)
         await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}), second)
         path_of_commands = occupied_path(bench)
         assert [tuple(round(value, 9) for value in each) for each in path_of_commands] == list(path)
+
+
+async def test_a_check_holds_until_another_robot_is_commanded_to_a_target_that_it_did_not_know(tmp_path):
+    async with control_bench(tmp_path) as bench:
+        await bench.lease(A.ACQUIRE)
+        bench.status = READY
+        await bench.commands((C.MOVE_ABSOLUTE, {"joint_positions": FAR}))
+        cell_occupancy = CellOccupancy()
+        checks(bench, cell_occupancy)
+        other = checks(bench, cell_occupancy, "arm-2")
+        assert other.why_changed(CheckVerdict(others={"arm": (HERE, FAR)})) is None
+        assert other.why_changed(CheckVerdict(others={"arm": (HERE,)})).code == "robot.other_moved"
 
 
 async def test_resume_and_another_motion_are_two_units(tmp_path):
