@@ -23,8 +23,6 @@ from tests.ports import free_port
 
 T = TypeVar("T")
 
-gc.disable()  # imports and items are no garbage; `pytest_collection_finish` enables it
-
 # A test must not depend on the machine's speed.
 settings.register_profile("robomesh", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("robomesh")
@@ -161,6 +159,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    gc.disable()  # modules and items are no garbage; `pytest_collection_finish` enables it
     sys.addaudithook(_no_process)
     if config.getoption("--quick"):
         settings.register_profile("quick", settings.get_profile("robomesh"), max_examples=20)

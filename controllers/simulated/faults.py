@@ -71,7 +71,7 @@ class Faults:
         self.known = known
         self._waiting = [parse_fault(text, known=known) for text in texts]
         self._spans: dict[str, Span] = {}
-        self._shown: dict[str, Span] = {}
+        self._shown: set[Span] = set()
         self._dropped_s = 0.0
 
     def first_client(self, now_s: float) -> None:
@@ -113,8 +113,8 @@ class Faults:
         A fault that is over before a busy machine looks is active for one look.
         """
         begun_by_now = {each for each in self._spans.values() if each.begin_s <= now_s}
-        active = self.active(now_s) | {each.name for each in begun_by_now - {*self._shown.values()}}
-        self._shown = {each.name: each for each in begun_by_now}
+        active = self.active(now_s) | {each.name for each in begun_by_now - self._shown}
+        self._shown = begun_by_now
         begun, ended = active - before, before - active
         for name in begun:
             logger.warning("fault: %s, %s", name, FAULTS[name].effect)

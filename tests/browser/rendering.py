@@ -7,16 +7,15 @@ import pytest
 
 from renderer import service
 from renderer.errors import NoEncoderError, NoOpenGLError
+from tests.renderer.renderer_site import shared_shapes
 
 
 @contextmanager
 def rendering(plant, folder, **settings):
-    """Return a renderer in the plant's thread; skip if it cannot draw. Its shapes are beside the folder."""
+    """Run a renderer in the plant's thread while the block runs; skip if it cannot draw."""
 
     async def start():
-        chosen = service.Settings(
-            site="hall", robots=("pt600",), folder=folder.parent / "prepared", **settings
-        )
+        chosen = service.Settings(site="hall", robots=("pt600",), folder=shared_shapes(folder), **settings)
         task = plant.loop.create_task(service.serve(plant.session, chosen))
         await asyncio.wait([task], timeout=1.0)
         if task.done():

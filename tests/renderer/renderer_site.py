@@ -23,14 +23,18 @@ HOME = (0.0, math.pi / 2, 0.0, 0.0, 0.0)
 NAMES = ("waist", "shoulder", "elbow", "wrist", "roll")
 
 
+def shared_shapes(tmp_path):
+    """Return the folder of prepared shapes that all tests share: an arm's cost 0.5 s of processor time."""
+    return tmp_path.parent / "prepared"
+
+
 @contextlib.asynccontextmanager
 async def renderer_site(mesh, tmp_path, *, arm=None, **settings):
     """Run the kinematics of a pt600 named `arm` and a renderer; yield the robot's and a monitor's session."""
     context_or_skip().release()
     async with open_session(mesh) as robot, open_session(mesh) as drawing, open_session(mesh) as monitor:
         arm = arm or single_arm(simulated=True)
-        # The tests share what is prepared once for each shape, 0.5 s of processor time for an arm.
-        wanted = Settings(site="hall", size=SIZE, folder=tmp_path.parent / "prepared", **settings)
+        wanted = Settings(site="hall", size=SIZE, folder=shared_shapes(tmp_path), **settings)
         tasks = [
             asyncio.create_task(kinematics.serve(robot, kinematics.Settings(site="hall", robots=(arm,)))),
             asyncio.create_task(service.serve(drawing, wanted)),

@@ -14,6 +14,7 @@ from renderer.drawing.shadow import FloorShadow
 from renderer.scene.scene import Finish
 from tests.renderer.bodies import context_or_skip
 from tests.renderer.make_pictures import PICTURES, STORED, free
+from tests.renderer.renderer_site import shared_shapes
 
 # Levels of 255, after a blur that removes small differences of edges between rasterisers.
 _BLUR_PX = 5
@@ -23,7 +24,7 @@ _MOST, _MOST_ON_AVERAGE = 20.0, 0.8
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     context_or_skip().release()
-    return tmp_path_factory.getbasetemp() / "prepared"
+    return shared_shapes(tmp_path_factory.mktemp("pictures"))
 
 
 def like_stored(picture, name):

@@ -13,6 +13,7 @@ from renderer.shapes.prepare import prepared
 from renderer.shapes.simplification import simplified
 from tests.renderer.bodies import ball, context_or_skip, cube, glb
 from tests.renderer.make_pictures import program
+from tests.renderer.renderer_site import shared_shapes
 
 ERRORS = (0.0, 0.001, 0.004)
 
@@ -109,7 +110,7 @@ def test_a_shape_with_fewer_levels_than_before_gets_one_of_its_own():
 @pytest.mark.slow
 def test_levels_of_detail_look_like_every_triangle(tmp_path, monkeypatch):
     context_or_skip().release()
-    folder = tmp_path.parent / "prepared"
+    folder = shared_shapes(tmp_path)
     fewer = program(folder, size=(1280, 720)).astype(float)
     monkeypatch.setattr(level_of_detail, "_MOST_PX", 1e-9)
     every = program(folder, size=(1280, 720)).astype(float)

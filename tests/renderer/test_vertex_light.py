@@ -8,6 +8,7 @@ from renderer.shapes.prepare import prepared
 from renderer.shapes.vertex_light import SCALES, counts_at, ordered
 from tests.renderer.bodies import ball, context_or_skip, cube
 from tests.renderer.make_pictures import free, front
+from tests.renderer.renderer_site import shared_shapes
 
 
 def lit_at(geometry, scale):
@@ -66,7 +67,7 @@ def test_transparent_triangles_keep_their_order_and_light_at_each_pixel():
 @pytest.mark.slow
 def test_light_at_vertices_looks_like_light_at_each_pixel(picture, tmp_path, monkeypatch):
     context_or_skip().release()
-    folder = tmp_path.parent / "prepared"
+    folder = shared_shapes(tmp_path)
     fast = picture(folder, size=(640, 360)).astype(float)
     monkeypatch.setattr(drawing, "counts_at", lambda scales, _: np.zeros(len(scales), dtype=np.uint32))
     exact = picture(folder, size=(640, 360)).astype(float)

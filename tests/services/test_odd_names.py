@@ -37,6 +37,7 @@ from services.watch import watch
 from tests.cells import single_arm
 from tests.ports import free_port
 from tests.renderer.bodies import context_or_skip
+from tests.renderer.renderer_site import shared_shapes
 
 pytestmark = pytest.mark.slow
 
@@ -106,7 +107,7 @@ def site_settings(folder: Path) -> dict:
         "watch": (watch.serve, watch.Settings(site=SITE, folder=folder / "watch")),
         "renderer": (
             renderer.service.serve,
-            renderer.service.Settings(site=SITE, size=(160, 90), folder=folder.parent / "prepared"),
+            renderer.service.Settings(site=SITE, size=(160, 90), folder=shared_shapes(folder)),
         ),
         "ros2": (ros2.serve, ros2.Settings(site=SITE, shapes=folder / "meshes")),
     }

@@ -11,7 +11,6 @@ import pytest
 
 from controllers import probing
 from controllers.probing import ProbeError
-from controllers.universal_robots.probe import RTDE
 from services.command_line.doctor import probe
 from services.command_line.doctor.probe import examine, probes
 from tests.controllers.fanuc.ftp_site import controller as fanuc_by_ftp
@@ -73,11 +72,6 @@ async def test_a_controller_of_universal_robots_is_recognized_by_its_answer(monk
         found = await examined(f"tcp://127.0.0.1:{primary}")
         assert (found.protocol, found.sent) == ("", "nothing")
         assert "Universal Robots' primary or secondary interface" in found.text
-
-
-def test_packages_of_universal_robots_are_counted_up_to_an_incomplete_one():
-    package = b"\0\0\0\x09\x10" + bytes(4)
-    assert "it sends 2 packages" in RTDE.heard(2 * package + package[:-1]).text
 
 
 async def test_a_controller_of_yaskawa_is_recognized_by_its_answer(monkeypatch):

@@ -8,14 +8,14 @@ import sys
 import av
 import cv2
 
-from tests import warm
 from tests.conftest import run
 from tests.renderer.renderer_site import moving, picture, renderer_site
+from tests.site import robomesh
 
 
 async def done(mesh, *arguments):
     words = (*map(str, arguments), "--connect", mesh.connect[0])
-    ended = await asyncio.to_thread(warm.run, words, timeout_s=120.0, text="")
+    ended = await asyncio.to_thread(robomesh, *words, timeout_s=120.0)
     return ended.returncode, ended.stdout, ended.stderr
 
 

@@ -208,8 +208,8 @@ def _axes(lines: Sequence[str]) -> tuple[list[float | None], list[str]]:
             rest.append(line)
             continue
         axes = found[match[1]]
-        # After a line that is none, an axis may be missing.
-        late = any(map(str.strip, rest)) or (match[1] == "Joint" and found["EXTAXS:"])
+        # A line between two axes may be a damaged axis.
+        late = rest or (match[1] == "Joint" and found["EXTAXS:"])
         if late or int(match[2]) != len(axes) + 1:
             raise ValueError(f"axes in a wrong order: {line[:60]!r}")
         axes.append(_number(match[3]))

@@ -36,7 +36,7 @@ def begin(settings: tuple[Path, Path, int]) -> Callable[[Job], dict[str, Any]]:
     from services.console.define.store import Store
 
     store = Store(store_folder)
-    # NumPy's library takes its memory at its first use, and ends the process where there is none.
+    # OpenBLAS takes 32 MB at its first use, and ends the process if a file has used up the memory before.
     np.linalg.inv(np.eye(2))
     confine(store_folder)
 

@@ -194,7 +194,11 @@ class WebSocketTransport(WebSocketsSansIOProtocol):
 
 
 class _ClosedOnce:
-    """A transport that uvicorn may close twice; asyncio's for TLS then has lost what it reads with."""
+    """A transport whose second close does nothing.
+
+    uvicorn closes it twice, and asyncio's transport for TLS forgets its protocol at the second close: it can
+    neither read nor end any more.
+    """
 
     def __init__(self, transport: asyncio.BaseTransport) -> None:
         self._transport = transport
