@@ -28,6 +28,7 @@ from protocol_gateway.authority.lease_rules import (
     not_sent,
     why_not_holder,
 )
+from protocol_gateway.authority.stop_rules import may_move
 from robomesh import reason_codes as codes
 from robomesh.contract.enum_names import enum_name
 from robomesh.reasons import Reason
@@ -64,7 +65,7 @@ def admit(authority: Authority, request: CommandRequest, *, operator: str, now: 
         return Admission(not_sent(used))
     if request.id <= lease.last_id:
         return Admission(not_sent(codes.COMMAND_ID_OLD(id=request.id, last=lease.last_id)))
-    refusal = deadline_refusal(request, now) or stop_refusal(authority, request)
+    refusal = deadline_refusal(request, now) or stop_refusal(authority, request, now)
     return Admission(refusal or Answer(True, ""), id_used=True)
 
 
@@ -131,20 +132,20 @@ def wait_refusal(arrived_s: float, now: Now) -> Answer | None:
     return not_sent(codes.COMMAND_WAITED(waited=waited_s, seconds=LONGEST_WAIT_S))
 
 
-def stop_refusal(authority: Authority, request: CommandRequest) -> Answer | None:
+def stop_refusal(authority: Authority, request: CommandRequest, now: Now) -> Answer | None:
     """Return the refusal of a command because of a latched stop, or of a RESET without one; None: allowed."""
-    reason = _stopped(authority, request)
+    reason = _stopped(authority, request, now)
     return None if reason is None else not_sent(reason)
 
 
-def _stopped(authority: Authority, request: CommandRequest) -> Reason | None:
+def _stopped(authority: Authority, request: CommandRequest, now: Now) -> Reason | None:
     stop = authority.stop
     if request.command == _RESET:
         if stop is None:
             return codes.STOP_NOT_LATCHED(id=request.stop_id) if request.stop_id else None
         if stop.id != request.stop_id:
             return codes.STOP_OTHER(asked=request.stop_id, id=stop.id, by=stop.by, reason=stop.reason)
-        return codes.STOP_MOVING(id=stop.id) if authority.moving else None
+        return codes.STOP_MOVING(id=stop.id) if may_move(authority, now) else None
     if stop is not None and request.command in MOTION_COMMANDS:
         return codes.STOP_LATCHED(id=stop.id, by=stop.by, reason=stop.reason)
     return None

@@ -95,7 +95,7 @@ def refusal_of(
         refusal = (
             refusal
             or deadline_refusal(request, seen.now)
-            or stop_refusal(authority, request)
+            or stop_refusal(authority, request, seen.now)
             or _latch_refusal(request, seen)
             or _closed_refusal(request, seen)
             or (None if command.step else _program_refusal(request, program))

@@ -246,6 +246,7 @@ class Authority:
         reset_s: Time of the last RESET that no status has followed (monotonic).
         stopping_s: Time at which the first stop since the last RESET was sent (monotonic). A repeated stop
             does not change it, because it must not hide that the robot ignores its stop.
+        unseen: Since the last RESET a motion was stopped that the robot was not seen to begin.
     """
 
     lease: Lease | None = None
@@ -254,6 +255,7 @@ class Authority:
     stop: LatchedStop | None = None
     last_stop_id: int = 0
     stopping_s: float | None = None
+    unseen: bool = False
     speed_percent: float | None = None
     reset_s: float | None = None
     moving: bool | None = None
@@ -398,7 +400,15 @@ def end_lease(
         return authority, None
     stop = _may_run(lease.motion) or (uncommanded and lease.commanded)
     ended = LeaseEnd(holder=lease.holder, why=why, renewals=lease.renewals, stop=stop)
+    authority = note_unseen(authority) if stop else authority
     return replace(authority, lease=None, ended=why), ended
+
+
+def note_unseen(authority: Authority) -> Authority:
+    """Return the authority before the stop of its holder's motion, which the robot may not have shown yet."""
+    motion = authority.motion
+    seen = motion is None or motion.seen or authority.moving
+    return authority if seen else replace(authority, unseen=True)
 
 
 def _may_run(motion: Motion | None) -> bool:

@@ -53,7 +53,7 @@ def record_command(
     """
     lease = authority.lease
     if request.command == _C.RESET and authority.stop is not None and authority.stop.id == request.stop_id:
-        authority = replace(authority, stop=None, stopping_s=None)
+        authority = replace(authority, stop=None, stopping_s=None, unseen=False)
     if request.command == _C.RESET:
         authority = replace(authority, reset_s=now.monotonic_s)
     if request.command == _C.SPEED:

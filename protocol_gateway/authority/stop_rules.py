@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
-from protocol_gateway.authority.lease_rules import Authority, LatchedStop, Now
+from protocol_gateway.authority.lease_rules import Authority, LatchedStop, Now, note_unseen
 from robomesh.reasons import Reason
 
 # A burst of dozens of units would fill the send buffer, which closes the connection.
 IN_TRANSIT_S = 0.1
+# A stopped motion that was not seen yet is seen by then, or has not begun.
+_UNSEEN_S = 0.3
 
 
 def latch_stop(
@@ -25,7 +27,7 @@ def latch_stop(
         since_ns=now.wall_ns,
         why=reason if isinstance(reason, Reason) else None,
     )
-    lease = authority.lease
+    authority, lease = note_unseen(authority), authority.lease
     if lease is not None:
         lease = replace(lease, motion=None)
     return replace(authority, stop=latched, last_stop_id=number, lease=lease), latched
@@ -50,3 +52,10 @@ def in_transit_since(authority: Authority, now: Now) -> float | None:
     """Return the time at which the latched stop's unit was sent (monotonic), if just now."""
     sent_s = None if authority.stop is None else authority.stop.sent_s
     return None if sent_s is None or now.monotonic_s - sent_s >= IN_TRANSIT_S else sent_s
+
+
+def may_move(authority: Authority, now: Now) -> bool:
+    """Return whether the robot moves, or may still move after its stop."""
+    stopping_s = authority.stopping_s
+    unseen = authority.unseen and stopping_s is not None and now.monotonic_s - stopping_s < _UNSEEN_S
+    return bool(authority.moving) or unseen

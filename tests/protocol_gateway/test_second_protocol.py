@@ -104,6 +104,7 @@ async def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_a
         assert "waist" in await refusal(site.command(C.MOVE_ABSOLUTE, joint_positions=far))
         stop = await site.stop(by="wang")
         await until(lambda: site.controller.activity == STATE.STOPPED)
+        await asyncio.sleep(0.3)  # this arm jumps: no motion was seen
         await site.lease(A.RENEW)
         await site.command(C.RESET, stop_id=stop.stop_id)
         await until(lambda: heard[-1] == "reset")

@@ -217,6 +217,25 @@ async def test_a_stop_is_not_reset_while_the_robot_moves(tmp_path):
         assert bench.control.authority.stop is None
 
 
+@pytest.mark.parametrize("ended", ["stopped", "released"])
+async def test_a_stop_is_not_reset_before_the_stopped_motion_could_be_seen(tmp_path, clock, ended):
+    async with control_bench(tmp_path) as bench:
+        await bench.lease(A.ACQUIRE)
+        bench.control.handle(MotionObserved(False))
+        await bench.commands((C.HOME, {}))
+        bench.control.handle(MotionObserved(False))  # dated before the motion
+        if ended == "stopped":
+            press(bench)
+        else:
+            await bench.lease(A.RELEASE, lease=bench.secret)
+            await bench.lease(A.ACQUIRE)
+        with refused(codes.STOP_MOVING, id="1"):
+            await bench.commands((C.RESET, {"stop_id": 1}), first_id=2)
+        clock.advance(0.31)
+        await bench.commands((C.RESET, {"stop_id": 1}), first_id=3)
+        assert bench.control.authority.stop is None
+
+
 async def test_stops_have_a_separate_connection(mesh, tmp_path):
     held, go_on = set(), threading.Event()
 
