@@ -69,7 +69,7 @@ async def test_a_recorder_with_a_hanging_reader_is_busy_and_answers_later(mesh, 
             os.kill(server.pid, signal.SIGSTOP)
             for _ in range(2):
                 with refused(codes.RECORDER_BUSY, request="list"):
-                    await client.ask(f"{BASE}/list", timeout_s=0.5)
+                    await client.ask(f"{BASE}/list", timeout_s=2.0)
             os.kill(server.pid, signal.SIGCONT)
             assert (await client.ask(f"{BASE}/list", timeout_s=50.0)).recordings
         finally:
