@@ -23,6 +23,10 @@ HIDE = """hidden => { Object.defineProperty(document, "hidden", {value: hidden, 
   if (hidden) document.dispatchEvent(new Event("visibilitychange")); }"""
 TAKE_CAPTURE = """() => { const held = document.activeElement;
   for (let id = 0; id < 999; id++) if (held.hasPointerCapture(id)) document.body.setPointerCapture(id); }"""
+# Times of a gesture's steps [ms].
+STEPS = """() => { for (const kind of ["down", "move", "up"])
+  addEventListener(`pointer${kind}`, each => steps.push(each.timeStamp), {capture: true}); }"""
+REST_MS = 120
 # A refusal may say the same as the one before.
 CLEAR = """notice => {
   for (const each of notice.childNodes) if (each.nodeType === Node.TEXT_NODE) each.data = ""; }"""
@@ -149,28 +153,35 @@ def test_a_touch_that_scrolls_or_only_taps_moves_nothing(open_page, plant):
     panel = region(page, "Tool")
     button(panel, "Jog").click()
     plus = button(panel, "Tool Z +")
-    before = audited(plant, "JOG")
+    page.evaluate(STEPS)
     for kind in (TOUCH, PEN):
         hand = Hand(page, kind)
-        plus.evaluate("each => each.scrollIntoView({block: 'center'})")
-        page.wait_for_timeout(600)  # a control that has just moved ignores presses
-        x, y = centre_of(plus)
-        from_ = page.evaluate("scrollY")
-        hand.press(x, y)
-        for moved in range(5, 120, 5):
-            hand.move(x, y - moved)
-        page.wait_for_timeout(300)
-        hand.lift()
-        if kind == TOUCH:
-            wait_until(lambda at=from_: page.evaluate("scrollY") > at + 50)
-        plus.evaluate("each => each.scrollIntoView({block: 'center'})")
-        page.wait_for_timeout(600)
-        x, y = centre_of(plus)
-        hand.press(x, y)
-        hand.lift()
-    page.wait_for_timeout(500)
-    assert audited(plant, "JOG") == before
+        for gesture in (scroll, tap):
+            for _ in range(40):
+                plus.evaluate("each => each.scrollIntoView({block: 'center'})")
+                page.wait_for_timeout(600)  # a control that has just moved ignores presses
+                before, at = audited(plant, "JOG"), page.evaluate("window.steps = [], scrollY")
+                gesture(page, hand, *centre_of(plus))
+                if page.evaluate("steps[1] - steps[0]") < REST_MS / 2:
+                    break  # on a busy machine a gesture may rest first, and hold
+            if (kind, gesture) == (TOUCH, scroll):
+                wait_until(lambda at=at: page.evaluate("scrollY") > at + 50)
+            page.wait_for_timeout(500)
+            assert audited(plant, "JOG") == before
     button(page, "Release").click()
+
+
+def scroll(page, hand, x, y):
+    hand.press(x, y)
+    for moved in range(20, 120, 5):
+        hand.move(x, y - moved)
+    page.wait_for_timeout(300)
+    hand.lift()
+
+
+def tap(_, hand, x, y):
+    hand.press(x, y)
+    hand.lift()
 
 
 def test_a_hidden_page_ends_the_jog_and_control(jog_page):
