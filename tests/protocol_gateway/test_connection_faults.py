@@ -1,22 +1,11 @@
 """Connections that freeze, drop, are refused, or lose their host: state, event, recovery."""
 
-import asyncio
-import contextlib
-import os
-import subprocess
-import sys
-from pathlib import Path
-
-import pytest
-
-from controllers.simulated.errors import SimulatorError
 from controllers.simulated.fault_requests import Mesh
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import SessionSettings
 from tests.protocol_gateway.faulty_site import faulty_site
 from tests.protocol_gateway.gateway_site import (
     LOOK_S,
-    PROMPT,
     STATE,
     gateway,
     looks_until,
@@ -24,8 +13,6 @@ from tests.protocol_gateway.gateway_site import (
     simulator,
     until,
 )
-
-HOUSE = Path(__file__).resolve().parents[2]
 
 
 async def test_a_frozen_controller_is_silent_within_a_second_and_reconnected(mesh, tmp_path):
@@ -90,78 +77,3 @@ async def test_a_simulator_serves_without_a_router(mesh, tmp_path):
     own = Mesh(site="hall", robot="arm", session=nowhere)
     async with simulator(mesh=own) as port, gateway(mesh, tmp_path, port) as site:
         assert site.controller.link == STATE.UP
-
-
-# --------------------------------------------------------------------- a host that has vanished
-
-SIMULATOR = """
-import asyncio
-from controllers.unit.simulated.service import Settings, serve
-settings = Settings(robot="pt600", listen="10.219.77.2:5400", insecure=True, demo=True)
-asyncio.run(serve(settings, ready=lambda line: print(line, flush=True)))
-"""
-
-
-def ip(*words):
-    done = subprocess.run(["ip", *words], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SimulatorError(f"ip {' '.join(words)}: {done.stderr.strip()}")
-
-
-@contextlib.contextmanager
-def another_host():
-    """Create a network namespace with a virtual cable; yield its name and its end of the cable."""
-    name = f"mesh-{os.getpid()}"
-    near_end, far_end = f"mh{os.getpid() % 10**6}", f"mt{os.getpid() % 10**6}"
-    try:
-        ip("netns", "add", name)
-    except (SimulatorError, FileNotFoundError) as error:
-        pytest.skip(f"no network namespace may be made here: {error}")
-    try:
-        ip("link", "add", near_end, "type", "veth", "peer", "name", far_end, "netns", name)
-        ip("addr", "add", "10.219.77.1/30", "dev", near_end)
-        ip("link", "set", near_end, "up")
-        ip("-n", name, "addr", "add", "10.219.77.2/30", "dev", far_end)
-        ip("-n", name, "link", "set", far_end, "up")
-        yield name, far_end
-    finally:
-        ip("netns", "del", name)
-
-
-@contextlib.asynccontextmanager
-async def simulator_in_namespace(name):
-    process = await asyncio.create_subprocess_exec(
-        "ip",
-        *("netns", "exec", name, sys.executable, "-c", SIMULATOR),
-        cwd=HOUSE,
-        env={**os.environ, "PYTHONPATH": str(HOUSE)},
-        stdout=asyncio.subprocess.PIPE,
-    )
-    try:
-        assert await process.stdout.readline()
-        yield
-    finally:
-        process.kill()
-        await process.wait()
-
-
-async def test_a_vanished_host_is_detected_in_seconds_and_reconnected(mesh, tmp_path):
-    with another_host() as (name, cable):
-        async with (
-            simulator_in_namespace(name),
-            gateway(mesh, tmp_path, 5400, host="10.219.77.2", **PROMPT) as site,
-        ):
-            ip("-n", name, "link", "set", cable, "down")
-            await until(lambda: site.controller.link == STATE.SILENT)
-            joints = len(site.seen["joints"])
-            await until(lambda: site.controller.link == STATE.DOWN)
-            await until(lambda: site.events("link.down"))
-            await until(
-                lambda: (
-                    "cannot connect" in site.controller.link_text
-                    or "does not answer" in site.controller.link_text
-                )
-            )
-            assert len(site.seen["joints"]) == joints
-            ip("-n", name, "link", "set", cable, "up")
-            await until(lambda: site.controller.link == STATE.UP, timeout_s=20.0)

@@ -1,13 +1,8 @@
 """Limits of old client programs: slow, deaf, half-open, too many or too fast ones affect no other."""
 
 import asyncio
-import ctypes
-import os
-import shutil
 import socket
-import subprocess
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +10,7 @@ from protocol_gateway.unit_protocol.stream import UnitStream
 from protocol_gateway.unit_server.rate_limit import Budget, Limits
 from robomesh.schemas import robomesh_pb2 as schema
 from tests.protocol_gateway.gateway_site import STATE, until
-from tests.protocol_gateway.old_client import ME, Program, legacy, legacy_site, program
+from tests.protocol_gateway.old_client import ME, legacy, legacy_site, program
 
 
 async def test_excess_clients_are_rejected_and_affect_no_other(mesh, tmp_path):
@@ -121,74 +116,6 @@ async def test_answers_to_a_vanished_client_are_not_logged(mesh, tmp_path, caplo
             # Bytes that were unread when the client vanished are not parsed.
             await until(lambda before=before: clients().units_refused > before and not clients().attached)
     assert "socket.send()" not in caplog.text
-
-
-# ----------------------------------------------------------------------- half-open
-
-
-def networks(*lines):
-    for line in lines:
-        subprocess.run(["ip", *line.split()], check=True, capture_output=True, timeout=60)
-
-
-@pytest.fixture
-def cable():
-    """Create a virtual cable to another network: (this end's address, connect there, pull it out)."""
-    name, address = f"rm{os.getpid()}", f"169.254.{os.getpid() % 250 + 1}"
-    if os.geteuid() != 0 or shutil.which("ip") is None:
-        pytest.skip("a cable of one's own to pull out takes root and `ip`")
-    try:
-        networks(f"netns add {name}")
-    except subprocess.CalledProcessError as error:
-        pytest.skip(f"no network of one's own to be had here: {error.stderr.decode().strip()}")
-
-    def connect(port):
-        """Create a socket in the other network."""
-        libc = ctypes.CDLL(None, use_errno=True)
-        own, other = Path("/proc/thread-self/ns/net"), Path("/run/netns", name)
-        with own.open() as own_namespace, other.open() as other_namespace:
-            assert libc.setns(other_namespace.fileno(), 0x40000000) == 0
-            try:
-                return socket.create_connection((f"{address}.1", port), timeout=40)
-            finally:
-                assert libc.setns(own_namespace.fileno(), 0x40000000) == 0
-
-    try:
-        networks(
-            f"link add {name} type veth peer name far netns {name}",
-            f"addr add {address}.1/24 dev {name}",
-            f"link set {name} up",
-            f"-n {name} addr add {address}.2/24 dev far",
-            f"-n {name} link set far up",
-        )
-        yield f"{address}.1", f"{address}.2", connect, lambda: networks(f"-n {name} link set far down")
-    finally:
-        # Only the cable: the network exists as long as one of its sockets.
-        subprocess.run(["ip", "link", "del", name], check=False, capture_output=True, timeout=60)
-        networks(f"netns del {name}")
-
-
-async def test_a_pulled_cable_ends_control_in_seconds(mesh, tmp_path, cable):
-    address, far, connect, pull_out = cable
-    settings = legacy(host=address, commanders={far: "li"})
-    async with legacy_site(mesh, tmp_path, settings) as site:
-        far_socket = await asyncio.to_thread(connect, settings.port)
-        far_program = Program(*await asyncio.open_connection(sock=far_socket))
-
-        def homed():
-            far_program.say(b"1#TIME*1@")
-            return "homed" in far_program.words and "idle" in far_program.words
-
-        far_program.say(b"1#COMMAND*home@")
-        await until(homed, timeout_s=30)
-        far_program.say(b"2#COMMAND*speed=5&ABSOLUTE.DEG*140;0;0;0;0@")
-        await until(lambda: site.controller.activity == STATE.MOVING)
-        await asyncio.to_thread(pull_out)
-        await until(lambda: site.events("stop.latched"))
-        assert "was not renewed" in (await site.event("stop.latched", 0)).text
-        await until(lambda: site.controller.legacy_clients.attached == 0, timeout_s=30)
-        far_program.writer.transport.abort()
-        await far_program.close()
 
 
 # -------------------------------------------------------------------------- budget

@@ -245,6 +245,7 @@ async def test_commands_are_one_operators_and_control_ends_with_their_client(mes
             await called(client, "home")
             await client.until(lambda: plant.controller.homed == STATE.YES)
             await client.until(lambda: not plant.seen["lease"][-1].holder)
+            await called(client, "speed", speed_percent=5.0)  # a busy machine sees it move
             await called(client, "move_absolute", joint_positions=[2.0, 0.5, 0.5, 0.5, 0.5])
             await client.until(lambda: plant.controller.activity == STATE.MOVING)
             assert plant.seen["lease"][-1].holder == "li"
