@@ -1,6 +1,7 @@
 """The robot's page in a real Chromium on a real site: display, control, stop."""
 
 import re
+from contextlib import suppress
 
 import pytest
 from playwright.sync_api import expect
@@ -48,7 +49,10 @@ def test_a_slider_moves_the_joint_when_it_is_let_go_and_not_before(open_page, pl
 
     def has_target():
         drag(page, "waist", 30, release=False)
-        expect(joints_notice(page)).to_contain_text(re.compile("Target waist:|No new motion:"))
+        with suppress(AssertionError):  # a handle that has just moved ignores a press
+            expect(joints_notice(page)).to_contain_text(
+                re.compile("Target waist:|No new motion:"), timeout=5000
+            )
         return "Target waist:" in joints_notice(page).inner_text()
 
     while not has_target():

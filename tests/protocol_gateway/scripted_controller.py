@@ -7,6 +7,7 @@ import time
 import numpy as np
 
 from robots.kinematics.joints import Joints, JointType
+from tests.serving import serving
 
 
 def endless_joints(count):
@@ -39,13 +40,8 @@ async def scripted_controller():
         for writer in writers:
             writer.write(text.encode())
 
-    server = await asyncio.start_server(serve, "127.0.0.1", 0)
-    try:
-        yield server.sockets[0].getsockname()[1], say, heard
-    finally:
-        server.close()
-        for writer in writers:
-            writer.transport.abort()
+    async with serving(serve) as port:
+        yield port, say, heard
 
 
 @contextlib.asynccontextmanager

@@ -25,6 +25,7 @@ from tests.protocol_gateway.gateway_site import (
 )
 from tests.protocol_gateway.old_client import legacy, program
 from tests.protocol_gateway.scripted_controller import repeated, scripted_controller
+from tests.serving import serving
 
 
 def flooded(rate_hz, seconds, flood=None, begin_s=10.0):
@@ -220,16 +221,14 @@ async def deluging():
             while data := await reader.read(100):
                 heard.extend(data)
         tasks[-1].cancel()
-        writer.transport.abort()
 
-    server = await asyncio.start_server(serve, "127.0.0.1", 0)
-    try:
-        yield server.sockets[0].getsockname()[1], on, heard
-    finally:
-        server.close()
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+    async with serving(serve) as port:
+        try:
+            yield port, on, heard
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
 
 
 def test_in_a_deluge_stops_and_other_robots_work(mesh, tmp_path):

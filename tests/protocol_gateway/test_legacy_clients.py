@@ -15,6 +15,7 @@ from tests.protocol_gateway.gateway_site import (
     until,
 )
 from tests.protocol_gateway.old_client import ME, legacy, legacy_site, program
+from tests.serving import serving
 
 PAPER = b"2# COMMAND* trace; home&ABSOLUTE.DEG* 100.00; 30.45; 92.66; - 67.10; - 25.85@"
 SAMPLE = [100.00, 30.45, 92.66, -67.10, -25.85]
@@ -288,20 +289,18 @@ async def test_a_controllers_refusal_is_relayed_only_to_the_client_in_control(me
             while await reader.read(4096):
                 writer.write(b"1#ERROR*5;not today@")
         telling.cancel()
-        writer.close()
 
-    async with await asyncio.start_server(controller, ME, 0) as server:
-        port = server.sockets[0].getsockname()[1]
-        async with (
-            gateway(mesh, tmp_path, port, legacy_clients=settings) as site,
-            program(settings) as one,
-            program(settings) as two,
-        ):
-            await until(lambda: one.positions and two.positions)
-            assert await one.asks(b"1#COMMAND*trace@") == (5, "not today")
-            await until(lambda: site.events("controller.refused"))
-            assert b"WEATHER*fine" in two.bytes
-            assert two.errors == []
+    async with (
+        serving(controller, ME) as port,
+        gateway(mesh, tmp_path, port, legacy_clients=settings) as site,
+        program(settings) as one,
+        program(settings) as two,
+    ):
+        await until(lambda: one.positions and two.positions)
+        assert await one.asks(b"1#COMMAND*trace@") == (5, "not today")
+        await until(lambda: site.events("controller.refused"))
+        assert b"WEATHER*fine" in two.bytes
+        assert two.errors == []
 
 
 async def test_a_robot_moves_without_the_port_of_old_programs_and_gets_it_when_it_is_free(

@@ -12,6 +12,7 @@ import pytest
 from robomesh.wire.session import open_session
 from tests.conftest import run
 from tests.protocol_gateway.gateway_site import gateway, until
+from tests.serving import serving
 
 UNIT = b"1#ABSOLUTE.DEG*%.2f;90;-90;0;0@"
 TIMED = b"2#ABSOLUTE.DEG*%.2f;90;-90;0;0&TIME*%.6f@"
@@ -50,9 +51,7 @@ async def seen_of(mesh, folder, say):
         with contextlib.suppress(ConnectionError):
             sent.set_result(await say(writer))
             await reader.read()
-        writer.transport.abort()
 
-    server = await asyncio.start_server(serve, "127.0.0.1", 0)
     samples = Samples()
     async with open_session(mesh) as monitor:
         subscription = monitor.subscribe("robomesh/hall/arm/joints", history=False, newest=1000)
@@ -62,8 +61,10 @@ async def seen_of(mesh, folder, say):
                 samples.take(sample)
 
         reading = asyncio.create_task(read())
-        port = server.sockets[0].getsockname()[1]
-        async with server, gateway(mesh, folder, port, up=False, stale_after_s=5.0, reconnect_after_s=20.0):
+        async with (
+            serving(serve) as port,
+            gateway(mesh, folder, port, up=False, stale_after_s=5.0, reconnect_after_s=20.0),
+        ):
             count = await sent
             await until(lambda: samples.count >= count)
         reading.cancel()

@@ -28,6 +28,7 @@ from robots.kinematics.joints import JointType
 from services.errors import SiteFileError
 from services.site_file.site import load
 from tests.protocol_gateway.gateway_site import PROMPT, STATE, A, C, gateway, refusal, until
+from tests.serving import serving
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "driver"
 ENTRY_POINTS = "[robomesh.drivers]\njson-lines = json_lines:JsonLines\nbroken = no_such_module:Driver\n"
@@ -74,11 +75,9 @@ async def json_controller():
                 await asyncio.sleep(0.01)
         finally:
             listening.cancel()
-            writer.transport.abort()
 
-    server = await asyncio.start_server(serve, "127.0.0.1", 0)
-    async with server:
-        yield server.sockets[0].getsockname()[1], heard, state
+    async with serving(serve) as port:
+        yield port, heard, state
 
 
 async def test_a_robot_of_another_protocol_is_shown_commanded_and_stopped_like_any_other(

@@ -1,6 +1,5 @@
 """Driver of FANUC's files by FTP: stepped, and in a gateway before the simulated controller."""
 
-import asyncio
 import contextlib
 import math
 from dataclasses import replace
@@ -49,6 +48,7 @@ from tests.controllers.fanuc.ftp_site import (
     stop_signals,
 )
 from tests.protocol_gateway.gateway_site import STATE, gateway, until
+from tests.serving import serving
 
 SIX = (JointType.ROTARY,) * 6
 AXES = ("10.00", "20.00", "-30.00", ".50", "90.00", "-180.00")
@@ -447,10 +447,8 @@ async def test_controller_that_refuses_the_user_is_down_and_says_so(mesh, tmp_pa
         writer.write(b"530 Not logged in.\r\n")
         # Until the gateway ends the connection.
         await reader.read()
-        writer.close()
 
-    async with await asyncio.start_server(refuse, "127.0.0.1", 0) as server:
-        port = server.sockets[0].getsockname()[1]
+    async with serving(refuse) as port:
         robot = {**FANUC_FTP, "options": replace(SETTINGS, user="li")}
         async with gateway(mesh, tmp_path, port, up=False, **robot) as site:
             await until(
