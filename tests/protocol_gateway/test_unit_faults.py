@@ -268,7 +268,7 @@ async def test_garbage_between_units_is_reported_at_a_limited_rate_and_counted(m
 async def test_a_missing_status_is_unknown_until_it_returns(mesh, tmp_path):
     async with faulty_site(mesh, tmp_path, demo=False) as (site, fault):
         await until(lambda: site.controller.mode == STATE.REMOTE)
-        await asyncio.sleep(0.1)  # its status is seen to repeat
+        await site.units(8)  # its status is seen to repeat
         await fault("mute")
         await until(lambda: site.events("status.gone"))
         await until(lambda: site.controller.mode == STATE.MODE_UNKNOWN)
@@ -282,7 +282,7 @@ async def test_a_missing_status_is_unknown_until_it_returns(mesh, tmp_path):
 
 async def test_a_controller_with_positions_only_has_an_unknown_status(mesh, tmp_path):
     async with faulty_site(mesh, tmp_path) as (site, fault):
-        await asyncio.sleep(0.1)  # its status is seen to repeat
+        await site.units(8)  # its status is seen to repeat
         await fault("bare")
         await until(lambda: site.controller.mode == STATE.MODE_UNKNOWN)
         assert site.controller.activity == STATE.ACTIVITY_UNKNOWN
