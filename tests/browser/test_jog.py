@@ -34,7 +34,9 @@ CLEAR = """notice => {
 
 
 @pytest.fixture
-def jog_page(open_page):
+def jog_page(open_page, plant):
+    key = "robomesh/hall/arm/controller"
+    wait_until(lambda: not plant.call(plant.session.last(key, timeout_s=40)).check_starting)
     page = open_page(ARM, drawn=False)
     ready(page)
     panel = region(page, "Tool")
