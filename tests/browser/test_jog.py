@@ -106,7 +106,7 @@ def test_each_end_of_a_hold_ends_the_jog_and_says_why(jog_page, plant, kind):
             texts.append(notice.inner_text())
             if f"Ended: {why}" in texts[-1]:
                 return
-            assert re.search("still starting|late|busy|150 ms", texts[-1]), texts[-1]
+            assert re.search("still starting|late|busy|150 ms|delayed", texts[-1]), texts[-1]
             page.wait_for_timeout(500)
         raise AssertionError(texts[-1])
 
