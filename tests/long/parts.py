@@ -244,7 +244,7 @@ def on_this_machine(folder: Path, part: Part) -> str:
             f"test ! -d {shared} || ln -s {shared} {place}",
             f"cd {clone}",
             f"export UV_PYTHON={part.python}",
-            part.set_up,
+            f"{part.set_up} || exit",
             *all_of(part, lambda each: f"sh -euc {shlex.quote(each)}"),
         ]
     )
