@@ -72,7 +72,9 @@ def test_all_commands_of_a_part_run_and_each_that_fails_is_named(long):
 def test_parts_that_cannot_run_stop_no_other_and_the_reason_is_said_last(long, monkeypatch):
     monkeypatch.setattr(parts.os, "geteuid", lambda: 0)
     monkeypatch.setattr(parts.shutil, "which", lambda name: None)
-    no_network = "printf 'error: No package\\n  cause: No route\\ndev: uv failed; see above\\n' && false && echo ready"
+    no_network = (
+        "printf 'error: No package\\n  cause: No route\\ndev: uv failed; see above\\n' && false && echo ready"
+    )
     code, table, _ = long(
         one=Part(("true",), debian="bookworm"), two=here("true"), three=here("true", set_up=no_network)
     )
