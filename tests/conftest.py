@@ -170,8 +170,8 @@ def _no_process(event: str, arguments: object) -> None:
     """Refuse a process that a quick test starts."""
     if not _in_quick_test or event not in ("subprocess.Popen", "os.fork", "os.posix_spawn"):
         return
-    # Outcomes of a pair study and places of libraries are cached: only the first test needs a process.
-    if not any(each in str(arguments) for each in ("robots.bodies.pair_study", "ldconfig")):
+    # Outcomes of a pair study, places of libraries and fonts are cached: only the first test needs a process.
+    if not any(each in str(arguments) for each in ("robots.bodies.pair_study", "ldconfig", "fc-list")):
         raise AssertionError("this test starts a process: mark it `slow`")
 
 

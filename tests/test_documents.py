@@ -70,7 +70,9 @@ def named_paths(where: str, text: str) -> list[str]:
     """Return the paths of this repository that a document names and that do not exist."""
     named = re.findall(r"`((?:[a-z0-9_]+/)+(?:[A-Za-z0-9_.-]+\.(?:py|ts|tsx|proto|toml|md))?)`", text)
     linked = re.findall(r"\]\((docs/[^)#]+)\)", text)
-    known = {path.name for path in ROOT.iterdir()}
+    # A site that ran here has left folders, too: `recordings` is also the name of a package.
+    ours = (ROOT / ".gitignore").read_text(encoding="utf-8").split()
+    known = {path.name for path in ROOT.iterdir()} - {line.strip("/") for line in ours}
     return [
         f"{where}: {name}"
         for name in named + linked
