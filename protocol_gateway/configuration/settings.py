@@ -49,6 +49,7 @@ class RobotSettings:
         stale_after_s: Without a unit for this long, the robot's state is unknown. Without positions for this
             long, motion is refused.
         reconnect_after_s: Without a unit for this long, the gateway reconnects.
+        thin_at_rest: Publish some of the joint states of the arm at rest, not all.
         legacy_clients: Where old client programs attach; None: they cannot.
         jog_speed: Greatest speed of the tool while an operator jogs [m/s]; 0: no jogs.
         check: Policy of the collision check before a motion: "require", "warn", "off".
@@ -72,6 +73,7 @@ class RobotSettings:
     recover: frozenset[Recovery] = frozenset()
     stale_after_s: float = 1.0
     reconnect_after_s: float = 4.0
+    thin_at_rest: bool = True
     legacy_clients: LegacySettings | None = None
     jog_speed: float = MOST_M_S
     check: str = "off"

@@ -17,7 +17,7 @@ class MotionDetector:
     """Detector of motion in positions, for controllers that do not report their activity."""
 
     def __init__(self, joint_types: Sequence[JointType]) -> None:
-        self._still = _still(joint_types)
+        self._still = still_bands(joint_types)
         self._samples: deque[tuple[float, tuple[float, ...]]] = deque()
 
     def add(self, positions: tuple[float, ...], time_s: float) -> None:
@@ -47,7 +47,8 @@ class MotionDetector:
         )
 
 
-def _still(joint_types: Sequence[JointType]) -> tuple[float, ...]:
+def still_bands(joint_types: Sequence[JointType]) -> tuple[float, ...]:
+    """Return the greatest change of each joint that is no motion [rad] or [m]."""
     return tuple(_STILL_PRISMATIC if each is JointType.PRISMATIC else _STILL_ROTARY for each in joint_types)
 
 
@@ -59,7 +60,7 @@ def has_arrived(
         return False
     return all(
         abs(there - here) <= still
-        for there, here, still in zip(target, positions, _still(joint_types), strict=True)
+        for there, here, still in zip(target, positions, still_bands(joint_types), strict=True)
     )
 
 

@@ -43,7 +43,12 @@ from protocol_gateway.seam import Activity, Carries, Channel, Driver
 from protocol_gateway.telemetry import set_up_file
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
-from protocol_gateway.telemetry.state_messages import controller_state, lease_state, timestamp
+from protocol_gateway.telemetry.state_messages import (
+    controller_state,
+    lease_state,
+    timestamp,
+    unit_counts,
+)
 from protocol_gateway.telemetry.telemetry import Telemetry
 from protocol_gateway.telemetry.watchdog import SLOW_STALE_S, STALE_S
 from robomesh import reason_codes as codes
@@ -100,6 +105,7 @@ class Robot:
         publisher = self._publisher
         self._controller_topic, self._lease_topic = publisher("controller"), publisher("lease")
         self._audit_topic, self._program_topic = publisher("audit"), publisher("program")
+        self._units_topic = publisher("units")
         self._journal = Journal(publisher("events"), settings.name)
         self._set_up_path = audit_path.with_suffix(".tool")
         confirmed = set_up_file.read(self._set_up_path)
@@ -142,6 +148,7 @@ class Robot:
             on_activity=self._on_activity,
             on_refused=self._on_refused,
             stop_expected=self._stop_expected,
+            rests=self._rests if self._settings.thin_at_rest else None,
         )
 
     def _make_link(self, driver: Driver, joints: Joints) -> ControllerLink:
@@ -449,6 +456,11 @@ class Robot:
         just_reset = authority.reset_s is not None and now_s - authority.reset_s < HEED_TIMEOUT_S
         return authority.stop is not None or just_reset
 
+    def _rests(self) -> bool:
+        """Return whether the arm rests, and no motion, program or jog is under way."""
+        authority = self._control.authority
+        return authority.moving is False and authority.motion is None and self._control.program is None
+
     def _on_refused(self) -> None:
         self._control.handle(events.UnitRefused())
 
@@ -492,12 +504,12 @@ class Robot:
     def _publish_state(self) -> None:
         now = read_clocks()
         last = self._link.last_received
-        authority = self._control.authority
+        authority, counters = self._control.authority, self._link.counters
         self._controller_topic.put(
             controller_state(
                 self._controller(),
                 authority.stop,
-                counters=self._link.counters,
+                counters=counters,
                 health=self._link.health,
                 age_s=None if last is None else now.monotonic_s - last.monotonic_s,
                 rate_hz=self._link.rate_hz,
@@ -514,6 +526,7 @@ class Robot:
                 now=now,
             )
         )
+        self._units_topic.put(unit_counts(counters, self._telemetry.thinned, now))
         self._lease_topic.put(lease_state(authority, now))
         self._programs.state.timestamp.CopyFrom(timestamp(now.wall_ns))
         self._program_topic.put(self._programs.state)

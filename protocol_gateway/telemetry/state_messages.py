@@ -195,6 +195,18 @@ def _link_reasons(controller: ControllerState) -> list[Reason]:
     return reasons
 
 
+def unit_counts(counters: LinkCounters, thinned: int, now: Now) -> schema.UnitCounts:
+    """Return what became of the controller's units."""
+    return schema.UnitCounts(
+        timestamp=timestamp(now.wall_ns),
+        received=counters.units_received,
+        malformed=counters.units_malformed,
+        lost=counters.units_lost,
+        skipped=counters.units_skipped,
+        thinned=thinned,
+    )
+
+
 def lease_state(authority: Authority, now: Now) -> schema.Lease:
     """Return the public lease state, without the secret."""
     message = schema.Lease(timestamp=timestamp(now.gateway_ns))

@@ -1,4 +1,6 @@
-"""Publication of what a controller reports: every unit immediately, with its own time stamp.
+"""Publication of what a controller reports, immediately, with its own time stamp.
+
+Every unit of a moving arm is published; those of a resting one are thinned, and all feed what judges them.
 
 `on_event` runs in the socket's callback: it only publishes and keeps the newest values.
 """
@@ -28,6 +30,7 @@ from protocol_gateway.seam.text_limits import LONGEST_TEXT
 from protocol_gateway.telemetry.journal import Journal
 from protocol_gateway.telemetry.signals import Signals
 from protocol_gateway.telemetry.state_messages import JointStatesMessage, raw_record
+from protocol_gateway.telemetry.thinning import Thinning
 from protocol_gateway.telemetry.watchdog import STALE_S, Watchdog
 from robomesh import reason_codes as codes
 from robomesh.publications.publisher import Publisher
@@ -81,6 +84,7 @@ class Telemetry:
         motion_impossible: Reason why its driver cannot move the arm; None: it can, or it only reads.
 
     Args:
+        rests: Returns whether the arm rests and nothing is under way; None: every unit is published.
         stop_expected: Returns whether the gateway's own stop is the reason of a stopped arm at a time.
     """
 
@@ -99,6 +103,7 @@ class Telemetry:
         on_activity: Callable[[Activity | None, float], None],
         on_refused: Callable[[], None],
         stop_expected: Callable[[float], bool],
+        rests: Callable[[], bool] | None = None,
     ) -> None:
         self._message = JointStatesMessage(joints.names)
         self._fast = fast
@@ -112,6 +117,8 @@ class Telemetry:
         self._stop_expected = stop_expected
         self._stale_after_s, self._status_stale_s = stale_after_s, status_stale_s
         self._next_slow_s = 0.0
+        self._rests = rests
+        self._thinning = Thinning(joints.types, stale_after_s)
         self.motion_detector = MotionDetector(joints.types)
         self._reported_software = ""
         self.forget()
@@ -132,6 +139,7 @@ class Telemetry:
         self.motion_impossible: Reason | None = None
         self.motion_detector.forget()
         self._signals.forget()
+        self._thinning.forget()
 
     def invalidate_positions(self, *, other_robot: bool) -> None:
         """Mark the positions as stale.
@@ -157,6 +165,11 @@ class Telemetry:
         if self._invalid is None or now_s - self._invalid[1] >= self._stale_after_s:
             return None
         return self._invalid[0]
+
+    @property
+    def thinned(self) -> int:
+        """Number of joint states that were not published, because the arm rested."""
+        return self._thinning.thinned
 
     def positions(self, now_s: float) -> tuple[float, ...] | None:
         """Return the newest positions [rad] or [m]; None: none since the link came up, or stale."""
@@ -315,13 +328,18 @@ class Telemetry:
         self._positions = joints.positions, received.monotonic_s
         if joints.controller_time_s is not None:
             self.controller_time_s = joints.controller_time_s
+        self.motion_detector.add(joints.positions, received.monotonic_s)
+        rests = self._rests is not None and self._rests()
+        if self._thinning.publishes(joints.positions, received.monotonic_s, rests=rests):
+            self._publish(joints, received)
+
+    def _publish(self, joints: JointsReceived, received: EventTime) -> None:
         message = self._message.fill(joints, received.wall_ns)
         self._fast.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
         if received.monotonic_s >= self._next_slow_s:
             # On a fixed grid, so that 100 Hz gives 10 Hz and not 9; a gap restarts the grid.
             self._next_slow_s = max(self._next_slow_s + _SLOW_S, received.monotonic_s + _SLOW_S / 2)
             self._slow.put(message, source_time_ns=received.wall_ns, dated_by=received.clock)
-        self.motion_detector.add(joints.positions, received.monotonic_s)
 
     def _on_refused(self, number: int, text: str) -> None:
         self._on_refusal()

@@ -69,6 +69,14 @@ _TOPICS = (
         publishers=_GATEWAY_OR_REPLAY,
     ),
     Topic(
+        name="units",
+        schema=schema.UnitCounts,
+        heartbeat_s=1.0,
+        priority=Priority.DATA,
+        stale_after_s=3.0,
+        publishers=_GATEWAY_OR_REPLAY,
+    ),
+    Topic(
         name="controller",
         schema=schema.ControllerState,
         heartbeat_s=1.0,

@@ -234,6 +234,22 @@ class LinkCounters(_message.Message):
     units_skipped: int
     def __init__(self, units_received: _Optional[int] = ..., units_malformed: _Optional[int] = ..., units_sent: _Optional[int] = ..., bytes_received: _Optional[int] = ..., bytes_sent: _Optional[int] = ..., records_unknown: _Optional[int] = ..., connections: _Optional[int] = ..., refusals: _Optional[int] = ..., units_lost: _Optional[int] = ..., units_skipped: _Optional[int] = ...) -> None: ...
 
+class UnitCounts(_message.Message):
+    __slots__ = ("timestamp", "received", "malformed", "lost", "skipped", "thinned")
+    TIMESTAMP_FIELD_NUMBER: _ClassVar[int]
+    RECEIVED_FIELD_NUMBER: _ClassVar[int]
+    MALFORMED_FIELD_NUMBER: _ClassVar[int]
+    LOST_FIELD_NUMBER: _ClassVar[int]
+    SKIPPED_FIELD_NUMBER: _ClassVar[int]
+    THINNED_FIELD_NUMBER: _ClassVar[int]
+    timestamp: _timestamp_pb2.Timestamp
+    received: int
+    malformed: int
+    lost: int
+    skipped: int
+    thinned: int
+    def __init__(self, timestamp: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., received: _Optional[int] = ..., malformed: _Optional[int] = ..., lost: _Optional[int] = ..., skipped: _Optional[int] = ..., thinned: _Optional[int] = ...) -> None: ...
+
 class StopState(_message.Message):
     __slots__ = ("id", "since", "by", "reason", "sent", "why")
     ID_FIELD_NUMBER: _ClassVar[int]

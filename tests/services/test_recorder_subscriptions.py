@@ -164,9 +164,9 @@ def test_the_rings_of_a_hundred_robots_fit_into_memory():
     rings = {row.name: subscriptions._ring(row) for row in TOPICS.values() if row.recorded}
     assert rings["joints"] == 2000
     assert rings["audit"] == 512
-    # Without video, which is recorded on request only; 300 bytes a message.
+    # Without video, which is recorded on request only; 270 bytes a message.
     states = sum(size for name, size in rings.items() if not name.startswith("video/"))
-    assert states * 100 * 300 < 256 << 20
+    assert states * 100 * 270 < 256 << 20
 
 
 def test_a_new_file_takes_older_pictures_only_if_its_decoder_needs_and_can_use_them(mesh, monkeypatch):

@@ -79,6 +79,7 @@ def _gateway(site: "Site", options: Options) -> Any:
             jog_speed=robot.jog_speed / 1000,
             stale_after_s=robot.stale_time_s,
             reconnect_after_s=max(4.0, 2.0 * robot.stale_time_s),
+            thin_at_rest=robot.thin_at_rest,
             legacy_clients=legacy_settings(robot),
             check=robot.check,
             check_within_s=robot.check_within_s,

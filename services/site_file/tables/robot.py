@@ -98,6 +98,8 @@ class Robot(TomlTable):
         stale_after_s: The stale time [s]: without a unit of the controller for this long, the robot's state
             is stale; without joint positions for this long, the gateway refuses motion. It reconnects after
             twice this time, at least 4 s. Absent: 1 s, or the time of three positions where they are rarer.
+        thin_at_rest: Publish ten joint states a second of the arm at rest, and all as soon as it moves
+            (docs/recordings.md). `false`: always all.
         demo: The simulator moves the arm until the first command.
         legacy_clients: Address for programs that use the unit protocol; absent: they cannot connect.
     """
@@ -124,6 +126,7 @@ class Robot(TomlTable):
     experimental: StrictBool = False
     recover: tuple[Recovery, ...] = ()
     stale_after_s: Annotated[float, Field(gt=0.05, le=60)] | None = None
+    thin_at_rest: StrictBool = True
     demo: StrictBool = False
     legacy_clients: LegacyClients | None = None
 
