@@ -86,7 +86,7 @@ def test_a_recording_ended_by_another_client_is_reported(mesh, router, tmp_path,
 def test_a_recording_whose_site_has_gone_ends_after_a_while_and_says_where_to_look(
     tmp_path, capsys, monkeypatch
 ):
-    monkeypatch.setattr("services.command_line.record.record._SILENCE_S", 0.5)
+    monkeypatch.setattr("services.command_line.record.record._SILENCE_S", 2.0)
     monkeypatch.setattr("services.command_line.record.record._SITE_GONE_S", 2.0)
     endpoint = f"tcp/127.0.0.1:{free_port()}"
 
