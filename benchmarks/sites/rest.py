@@ -27,6 +27,7 @@ import json
 import random
 import shutil
 import subprocess
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -69,7 +70,8 @@ def measure(
     seconds: float = 20.0,
     page: Annotated[bool, Option(help="also with the page open")] = True,
 ) -> Iterator[dict[str, Any]]:
-    build_page.build()
+    with contextlib.redirect_stdout(sys.stderr):
+        build_page.build()
     for case in cases.split(","):
         protocol, _, arms = case.partition(":")
         yield {
@@ -267,6 +269,17 @@ def put(endpoint: str, arms: int) -> None:
                 publisher.put(payload)
 
 
+_LINES = f"""
+import sys, time
+at, lines = time.monotonic(), (b"0" * {_BYTES} + b"\\n") * int(sys.argv[1])
+while True:
+    at += 1 / {HZ}
+    time.sleep(max(at - time.monotonic(), 0.0))
+    sys.stdout.buffer.write(lines)
+    sys.stdout.flush()
+"""
+
+
 def mqtt(arms: int, seconds: float) -> dict[str, Any] | str:
     """Measure as many publications of MQTT with one subscriber, through mosquitto."""
     if not all(map(shutil.which, ("mosquitto", "mosquitto_pub", "mosquitto_sub"))):
@@ -277,17 +290,8 @@ def mqtt(arms: int, seconds: float) -> dict[str, Any] | str:
         with (
             program("mosquitto_sub", "-p", port, "-t", "arm") as subscriber,
             program("mosquitto_pub", "-p", port, "-t", "arm", "-l", stdin=subprocess.PIPE) as publisher,
-            process(write_lines, publisher.stdin, arms),
+            program(sys.executable, "-c", _LINES, str(arms), stdout=publisher.stdin),
         ):
             time.sleep(3.0)
             pids = {"broker": broker.pid, "publisher": publisher.pid, "subscriber": subscriber.pid}
             return during(pids, seconds, Path("/nonexistent"))["processes"]
-
-
-def write_lines(stream: Any, arms: int) -> None:
-    at, lines = time.monotonic(), (b"0" * _BYTES + b"\n") * arms
-    while True:
-        at += 1 / HZ
-        time.sleep(max(at - time.monotonic(), 0.0))
-        stream.write(lines)
-        stream.flush()
