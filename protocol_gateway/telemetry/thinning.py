@@ -48,14 +48,11 @@ class Thinning:
         published = self._published
         if not rests or published is None or self._left_band(positions, published):
             self._restless_s = time_s
-        if time_s - self._restless_s < SETTLED_S:
-            self._next_s = time_s + self._longest_s
-        elif time_s >= self._next_s:
-            # On a fixed grid, so that 100 Hz gives 10 Hz and not 9; a gap restarts the grid.
-            self._next_s = max(self._next_s + self._longest_s, time_s + self._longest_s / 2)
-        else:
+        if time_s - self._restless_s >= SETTLED_S and time_s < self._next_s:
             self.thinned += 1
             return False
+        # Of all arms at the same times: what receives several is woken once for those that arrive together.
+        self._next_s = (int(time_s / self._longest_s + 1e-6) + 1) * self._longest_s
         self._published = positions
         return True
 

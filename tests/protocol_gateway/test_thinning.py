@@ -65,6 +65,15 @@ def test_every_unit_is_published_while_the_arm_is_busy_and_shortly_after():
     assert len(numbers) < 400
 
 
+def test_arms_that_rest_are_published_at_the_same_times():
+    arms = [Thinning(TYPES, 1.0) for _ in range(2)]
+    numbers = [
+        [k for k in range(500) if arm.publishes(REST, k * PERIOD_S + late_s, rests=True)]
+        for arm, late_s in zip(arms, (0.0, 0.003), strict=True)
+    ]
+    assert all(abs(one - other) <= 1 for one, other in zip(*(each[-20:] for each in numbers), strict=True))
+
+
 def test_positions_after_a_lost_link_are_published():
     thinning = Thinning(TYPES, 1.0)
     published([REST] * 200, thinning=thinning)
