@@ -114,12 +114,11 @@ def table(protocol: str, number: int, port: int) -> str:
         f'controller = "{"udp" if protocol == "hses" else "tcp"}://127.0.0.1:{port}"\n'
         + f"yaskawa.pulses_per_degree = {PULSES}\n"
         * (protocol == "hses")
-        * (protocol == "hses")
     )
 
 
 def until_published(endpoint: str, arms: int) -> None:
-    """Wait until every arm's joints are on the mesh."""
+    """Wait until the kinematics of every arm is on the mesh."""
     with zenoh.open(client_config((endpoint,))) as session:
         until(
             lambda: len(list(session.get("robomesh/bench/*/kinematics"))) >= arms,

@@ -246,7 +246,7 @@ class Authority:
         reset_s: Time of the last RESET that no status has followed (monotonic).
         stopping_s: Time at which the first stop since the last RESET was sent (monotonic). A repeated stop
             does not change it, because it must not hide that the robot ignores its stop.
-        unseen: Since the last RESET a motion was stopped that the robot was not seen to begin.
+        unseen: A motion was stopped since the last RESET before the robot was seen to begin it.
     """
 
     lease: Lease | None = None
@@ -405,7 +405,7 @@ def end_lease(
 
 
 def note_unseen(authority: Authority) -> Authority:
-    """Return the authority before the stop of its holder's motion, which the robot may not have shown yet."""
+    """Note, before a motion of the holder is stopped, whether the robot has not been seen to begin it."""
     motion = authority.motion
     seen = motion is None or motion.seen or authority.moving
     return authority if seen else replace(authority, unseen=True)

@@ -196,7 +196,7 @@ def _link_reasons(controller: ControllerState) -> list[Reason]:
 
 
 def unit_counts(counters: LinkCounters, thinned: int, now: Now) -> schema.UnitCounts:
-    """Return what became of the controller's units."""
+    """Return the numbers of the controller's units."""
     return schema.UnitCounts(
         timestamp=timestamp(now.wall_ns),
         received=counters.units_received,

@@ -1,6 +1,6 @@
 """Publication of what a controller reports, immediately, with its own time stamp.
 
-Every unit of a moving arm is published; those of a resting one are thinned, and all feed what judges them.
+Every unit of a moving arm is published, and some of a resting one (`thinning`); all of them are evaluated.
 
 `on_event` runs in the socket's callback: it only publishes and keeps the newest values.
 """

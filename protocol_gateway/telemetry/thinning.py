@@ -2,9 +2,9 @@
 
 published    while
 ---------    -----------------------------------------------------------------------------------------
-every unit   the arm moves, or something was commanded; a joint has left the band around the value that
-             was published last, from that unit on; and for `SETTLED_S` after each of these
-some         otherwise: at least every `longest_s`
+every unit   the arm moves, or a motion, program or jog is under way; a joint is outside the band around its
+             last published value, from that unit on; and for `SETTLED_S` after each of these
+some         otherwise: one about every 0.1 s, or five within the stale time if that is more often
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ _BAND = 0.1
 
 
 class Thinning:
-    """Decision which positions are published.
+    """Choice of the positions that are published.
 
     Attributes:
         thinned: Number of positions that were not published.
@@ -43,7 +43,7 @@ class Thinning:
         """Return whether positions [rad] or [m] of a monotonic time are published.
 
         Args:
-            rests: The arm does not move and will not: nothing is under way.
+            rests: The arm does not move, and nothing that moves it is under way.
         """
         published = self._published
         if not rests or published is None or self._left_band(positions, published):
@@ -51,7 +51,7 @@ class Thinning:
         if time_s - self._restless_s >= SETTLED_S and time_s < self._next_s:
             self.thinned += 1
             return False
-        # Of all arms at the same times: what receives several is woken once for those that arrive together.
+        # All arms publish at the same times: states that arrive together wake a receiver once.
         self._next_s = (int(time_s / self._longest_s + 1e-6) + 1) * self._longest_s
         self._published = positions
         return True
