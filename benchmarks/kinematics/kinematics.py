@@ -37,7 +37,7 @@ from robots.kinematics.model import RobotModel, all_positions, build_model, tool
 from robots.kinematics.singularity import arm_length
 from robots.schema.poses import inverse
 from services.kinematics.cell_state import CellState
-from services.kinematics.states import FramesMessage, add_proximity, kinematic_state
+from services.kinematics.states import FramesMessage, StateMessage, add_proximity
 from services.site_file.tables.fixtures import Fixture as FixtureSettings
 from services.site_file.tables.fixtures import fixture_shape
 
@@ -288,6 +288,7 @@ def messages() -> dict[str, float]:
     state = CellState({"arm": np.inf, "other": np.inf}, time.monotonic)
     state.update("other", model.joints.home)
     frames = FramesMessage(model, prefix="bench/arm", base_to_site=np.eye(4))
+    states = StateMessage(model, reach=reach)
     inner, data, tool = model._pinocchio, model._workspace, model._frame_ids[0]
 
     def bare(positions: FloatArray) -> None:
@@ -295,7 +296,7 @@ def messages() -> dict[str, float]:
         pinocchio.computeFrameJacobian(inner, data, positions, tool, pinocchio.ReferenceFrame.LOCAL)
 
     def published(positions: FloatArray) -> None:
-        found = kinematic_state(model, positions, positions, reach=reach, timestamp=now)
+        found = states.filled(positions, positions, now)
         add_proximity(found, state.proximity(cell, "arm", positions), site="bench")
         found.SerializeToString()
 

@@ -105,7 +105,6 @@ class Robots:
         """Follow the site's robots until cancelled."""
         async with self._group:
             self._subscribe(_TOPICS)
-            self._subscribe_live()
             self._group.create_task(self._watch_providers())
 
     def ages(self, state: RobotState) -> Ages:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
 from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -31,14 +32,17 @@ from services.kinematics.floor import floor_event
 from services.kinematics.shown_cell import ShownCell
 from services.kinematics.states import (
     FramesMessage,
+    StateMessage,
     add_proximity,
-    kinematic_state,
     positions_by_name,
     velocities_by_name,
 )
 
 log = logging.getLogger(__name__)
 
+# Smaller changes of a joint [rad] or [m] are its encoder's noise, less than an arm repeats: the arm is where
+# it was. An arm at rest is computed once.
+_NOISE = 4e-5
 # Velocities are not computed from an older previous state.
 _LONGEST_DIFFERENCE_S = 0.5
 # Rate at which `frames` repeats the fixtures, which do not move.
@@ -93,10 +97,12 @@ class ArmPublisher:
         self._frames_limit = _RateLimit(self._frames.topic.rate_hz)
         self._kinematics_limit = _RateLimit(self._kinematics.topic.rate_hz)
         self._fixtures_limit = _RateLimit(_FIXTURES_HZ)
-        self._message = FramesMessage(arm.model, prefix=arm.path, base_to_site=arm.base_to_site)
+        self._frames_message = FramesMessage(arm.model, prefix=arm.path, base_to_site=arm.base_to_site)
+        self._state_message = StateMessage(arm.model, reach=arm.reach)
+        self._placed_at: FloatArray | None = None
         self._alarms = Alarms()
         self._before: tuple[int, FloatArray] | None = None
-        self._due: tuple[Sample, FloatArray, JointStates] | None = None
+        self._due: tuple[Sample, FloatArray, FloatArray, JointStates] | None = None
         self._mismatch_log = _MismatchLog(arm)
         self._floor_reported: Cell | None = None
         self._placed: object = None
@@ -119,16 +125,19 @@ class ArmPublisher:
             return
         message = sample.message()
         assert isinstance(message, JointStates)
-        positions = positions_by_name(self._arm.model.joints, message)
-        self._mismatch_log.update(None if positions is not None else message)
-        if positions is None:
+        reported = positions_by_name(self._arm.model.joints, message)
+        self._mismatch_log.update(None if reported is not None else message)
+        if reported is None:
             return
+        positions = self._placed_at
+        if positions is None or np.abs(reported - positions).max() > _NOISE:
+            positions = self._placed_at = reported
         if sample.live:
             self._cell_state.update(self._arm.name, positions)
         if frames_due:
             self._publish_frames(sample, positions, message.timestamp)
         if sample.live and kinematics_due:
-            self._due = sample, positions, message
+            self._due = sample, reported, positions, message
 
     def publish_state(self) -> None:
         """Publish the state of the last sample that was taken, if it is due."""
@@ -139,7 +148,9 @@ class ArmPublisher:
     def _publish_frames(self, sample: Sample, positions: FloatArray, timestamp: Timestamp) -> None:
         now, time_ns = self._shown.now, sample.header.source_time_ns
         with_fixtures = self._fixtures_limit.due(time_ns) or self._placed is not now.fixtures
-        transforms = self._message.filled(positions, timestamp, now.placements if with_fixtures else {})
+        transforms = self._frames_message.filled(
+            positions, timestamp, now.placements if with_fixtures else {}
+        )
         self._placed = now.fixtures
         if sample.live:
             self._frames.put(transforms, source_time_ns=time_ns, dated_by=sample.header.publisher)
@@ -147,14 +158,17 @@ class ArmPublisher:
             # A last value: answer late joiners with it. Published, it would look live.
             self._frames.remember(transforms, source_time_ns=time_ns)
 
-    def _publish_state(self, sample: Sample, positions: FloatArray, message: JointStates) -> None:
+    def _publish_state(
+        self, sample: Sample, reported: FloatArray, positions: FloatArray, message: JointStates
+    ) -> None:
         arm, built = self._arm, self._shown.now.built
         time_ns, dated_by = sample.header.source_time_ns, sample.header.publisher
         velocities = velocities_by_name(arm.model.joints, message)
         if velocities is None:
-            velocities = _difference(self._before, time_ns, positions)
-        self._before = time_ns, positions
-        state, proximity = _state(arm, self._cell_state, built, positions, velocities, message.timestamp)
+            velocities = _difference(self._before, time_ns, reported)
+        self._before = time_ns, reported
+        state = self._state_message.filled(positions, velocities, message.timestamp)
+        proximity = self._add_cell(state, built, positions)
         self._kinematics.put(state, source_time_ns=time_ns, dated_by=dated_by)
         # Unproven joints may be elsewhere: alarms about them would be invented.
         conditions = () if state.joints_unproven else _conditions(arm, built, positions, state, proximity)
@@ -168,6 +182,21 @@ class ArmPublisher:
             event.timestamp.CopyFrom(message.timestamp)
             self._events.put(event, source_time_ns=time_ns, dated_by=dated_by)
             log.log(_LEVELS[event.severity], "%s: %s", arm.path, event.text)
+
+    def _add_cell(
+        self, state: schema.KinematicState, built: Cell | None, positions: FloatArray
+    ) -> Proximity | None:
+        """Add to a state what the arm's cell knows.
+
+        The clearances are None until the hulls are built, and for an arm whose joints are unproven.
+        """
+        name = self._arm.name
+        state.joints_unproven = self._cell_state.is_unproven(name)
+        if built is None or state.joints_unproven:
+            return None
+        proximity = self._cell_state.proximity(built, name, positions)
+        add_proximity(state, proximity, site=self._arm.site)
+        return proximity
 
 
 class ArmPublishers:
@@ -211,27 +240,6 @@ class ArmPublishers:
             await asyncio.sleep(0)
             for publisher in taken:
                 publisher.publish_state()
-
-
-def _state(
-    arm: FollowedArm,
-    cell_state: CellState,
-    built: Cell | None,
-    positions: FloatArray,
-    velocities: FloatArray | None,
-    timestamp: Timestamp,
-) -> tuple[schema.KinematicState, Proximity | None]:
-    """Return the `kinematics` message and the clearances.
-
-    The latter are None until the hulls are built, and for an arm whose joints are unproven.
-    """
-    state = kinematic_state(arm.model, positions, velocities, reach=arm.reach, timestamp=timestamp)
-    state.joints_unproven = cell_state.is_unproven(arm.name)
-    if built is None or state.joints_unproven:
-        return state, None
-    proximity = cell_state.proximity(built, arm.name, positions)
-    add_proximity(state, proximity, site=arm.site)
-    return state, proximity
 
 
 def _conditions(

@@ -54,6 +54,7 @@ class FramesMessage:
         self._numbers = [*numbers.values()]
         self._message = FrameTransforms()
         self._rows = [self._added(self._message, f"{prefix}/{name}") for name in numbers]
+        self._positions: FloatArray | None = None
 
     def _added(self, message: FrameTransforms, frame_id: str) -> "_Row":
         row = message.transforms.add(parent_frame_id=self._site, child_frame_id=frame_id)
@@ -68,18 +69,24 @@ class FramesMessage:
         """Return the placements in the site's frame; the next call changes a message without fixtures.
 
         Args:
-            positions: (n,) joint positions [rad] or [m].
+            positions: (n,) joint positions [rad] or [m]; the last call's array gets its placements.
             fixtures: (4, 4) placements in the site's frame to include, by name.
         """
-        placements = self._base_to_site @ all_placements(self._model, positions)[self._numbers]
-        for row, placement in zip(self._rows, placements.tolist(), strict=True):
-            _fill(row, placement, timestamp)
+        if positions is not self._positions:
+            placements = self._base_to_site @ all_placements(self._model, positions)[self._numbers]
+            for row, placement in zip(self._rows, placements.tolist(), strict=True):
+                _fill(row, placement)
+            self._positions = positions
+        for _, _, at in self._rows:
+            at.seconds, at.nanos = timestamp.seconds, timestamp.nanos
         if not fixtures:
             return self._message
         message = FrameTransforms()
         message.CopyFrom(self._message)
         for name, fixture in fixtures.items():
-            _fill(self._added(message, f"{self._site}/{name}"), fixture.tolist(), timestamp)
+            row = self._added(message, f"{self._site}/{name}")
+            _fill(row, fixture.tolist())
+            row[2].CopyFrom(timestamp)
         return message
 
 
@@ -87,11 +94,10 @@ class FramesMessage:
 _Row = tuple[Vector3, Quaternion, Timestamp]
 
 
-def _fill(row: _Row, placement: Sequence[Sequence[float]], timestamp: Timestamp) -> None:
-    to, turn, at = row
+def _fill(row: _Row, placement: Sequence[Sequence[float]]) -> None:
+    to, turn, _ = row
     to.x, to.y, to.z = placement[0][3], placement[1][3], placement[2][3]
     turn.x, turn.y, turn.z, turn.w = quaternion(placement)
-    at.seconds, at.nanos = timestamp.seconds, timestamp.nanos
 
 
 def quaternion(rotation: Sequence[Sequence[float]]) -> tuple[float, float, float, float]:
@@ -115,31 +121,47 @@ def quaternion(rotation: Sequence[Sequence[float]]) -> tuple[float, float, float
     return x / length, y / length, z / length, w / length
 
 
-def kinematic_state(
-    model: RobotModel,
-    positions: FloatArray,
-    velocities: FloatArray | None,
-    *,
-    reach: float,
-    timestamp: Timestamp,
-) -> schema.KinematicState:
-    """Return tool pose and twist in the base frame, manipulability, and margins to singularities and limits.
+class StateMessage:
+    """An arm's tool pose and twist in the base frame, manipulability, margins to singularities and limits.
 
     Args:
-        positions: (n,) [rad] or [m].
-        velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
         reach: Result of `robots.kinematics.singularity.arm_length` [m].
     """
-    joints, jacobian = model.joints, tool_jacobian(model, positions)
+
+    def __init__(self, model: RobotModel, *, reach: float) -> None:
+        self._model, self._reach = model, reach
+        self._positions: FloatArray | None = None
+
+    def filled(
+        self, positions: FloatArray, velocities: FloatArray | None, timestamp: Timestamp
+    ) -> schema.KinematicState:
+        """Return a new message.
+
+        Args:
+            positions: (n,) [rad] or [m]; the last call's array gets its pose and margins.
+            velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
+        """
+        if positions is not self._positions:
+            self._jacobian = tool_jacobian(self._model, positions)
+            self._placed = _placed_state(self._model, positions, self._jacobian, self._reach)
+            self._positions = positions
+        message = schema.KinematicState(timestamp=timestamp)
+        message.MergeFrom(self._placed)
+        if velocities is not None:
+            twist = (self._jacobian @ velocities).tolist()
+            _set(message.linear_velocity, twist[:3])
+            _set(message.angular_velocity, twist[3:])
+        return message
+
+
+def _placed_state(
+    model: RobotModel, positions: FloatArray, jacobian: FloatArray, reach: float
+) -> schema.KinematicState:
+    """Return what depends on an arm's positions alone."""
+    joints = model.joints
     manipulable, margin = dexterity(jacobian, joints.types, reach=reach)
-    message = schema.KinematicState(
-        timestamp=timestamp, manipulability=manipulable, singularity_margin=margin
-    )
+    message = schema.KinematicState(manipulability=manipulable, singularity_margin=margin)
     message.tool_to_base.extend(tool_placement(model, positions).ravel().tolist())
-    if velocities is not None:
-        twist = (jacobian @ velocities).tolist()
-        _set(message.linear_velocity, twist[:3])
-        _set(message.angular_velocity, twist[3:])
     for name, position, lower, upper in zip(
         joints.names, positions.tolist(), joints.lower.tolist(), joints.upper.tolist(), strict=True
     ):

@@ -18,7 +18,7 @@ from robots.descriptions.description import library_names, load
 from robots.kinematics.model import build_model, tool_placement
 from robots.schema.poses import rpy_rotation
 from services import kinematics
-from services.kinematics.states import FramesMessage, kinematic_state, quaternion
+from services.kinematics.states import FramesMessage, StateMessage, quaternion
 from tests.cells import single_arm
 from tests.conftest import last_value
 from tests.refusals import refused
@@ -101,7 +101,7 @@ def test_the_twist_equals_the_tools_numeric_derivative(name):
     random = np.random.default_rng(3)
     positions = random.uniform(model.joints.lower, model.joints.upper)
     velocities = random.uniform(-1, 1, len(model.joints))
-    state = kinematic_state(model, positions, velocities, reach=1.0, timestamp=Timestamp())
+    state = StateMessage(model, reach=1.0).filled(positions, velocities, Timestamp())
     dt = 1e-6
     after, before = (tool_placement(model, positions + sign * dt * velocities) for sign in (0.5, -0.5))
     linear = (after[:3, 3] - before[:3, 3]) / dt
