@@ -1,7 +1,8 @@
 """Subscriptions of the recorder: one a topic, however many files record it.
 
-Zenoh keeps the messages of each topic in a ring buffer; one thread drains all rings every few milliseconds.
-The thread never blocks, and no Python runs in Zenoh's own threads: 2 us a message in all.
+Zenoh keeps the messages of each topic in a ring buffer; one thread drains all rings every few milliseconds,
+and those of topics that are seldom published every 20 ms. The thread never blocks, and no Python runs in
+Zenoh's own threads: 2 us a message in all.
 """
 
 import logging
@@ -32,6 +33,9 @@ _DRAIN_EVERY_S = 0.004
 # Limit of the thread's load: with many robots the interval grows up to a maximum, unless a ring fills.
 _MAX_BUSY = 0.2
 _MAX_INTERVAL_S = 0.02
+# A ring that is found empty so often in turn is drained at the longest interval until something is in it:
+# the joints of an arm that moves are never so far apart, those of one at rest are.
+_EMPTY_IN_TURN = 5
 # Other threads run for this time while rings fill faster than that.
 _MIN_INTERVAL_S = 0.0005
 # A ring holds twenty seconds of its topic at its full rate, in case this thread does not run, or a burst of
@@ -40,6 +44,8 @@ _RING_S, _SMALLEST_RING = 20.0, 512
 _MAX_BATCH = 2048
 _MAX_MISSING = 10_000
 _LOG_INTERVAL_S = 10.0
+QUIET = -1.0
+"""In place of how full a ring is: it has been empty for some time."""
 # Limit of a view's frames since its newest key frame, and what each needs besides its payload, about.
 _MAX_PREAMBLE_BYTES, _FRAME_BYTES = 16 << 20, 200
 _REPLY_TIMEOUT_S = 2.0
@@ -93,6 +99,7 @@ class _TopicSubscription:
         self._session = session
         self._sequences: dict[str, _Sequence] = {}
         self._replies: deque[zenoh.Sample] = deque()
+        self._empty_in_turn, self._drain_at = 0, 0.0
         # The ring is not drained before the reply with earlier messages has come, or its timeout.
         self._blocked_until = 0.0
         self._subscriber = _subscribe(session, key_expr, self.row)
@@ -129,8 +136,13 @@ class _TopicSubscription:
             self.query()
 
     def drain(self, sinks: Iterable[Sink]) -> float:
-        """Deliver received messages to the sinks; return how full the ring was, as a share of its places."""
-        blocked = time.monotonic() < self._blocked_until  # read first: the reply arrives before it ends
+        """Deliver received messages to the sinks.
+
+        Returns:
+            How full the ring was, as a share of its places; `QUIET`: it has been empty for some time.
+        """
+        now = time.monotonic()
+        blocked = now < self._blocked_until  # read first: the reply arrives before it ends
         while self._replies:
             reply = self._replies.popleft()
             try:
@@ -159,7 +171,15 @@ class _TopicSubscription:
                 # Read after taking the message, so that it is never before the publication.
                 received_ns = time.monotonic_ns()
                 self._deliver(key, header, sample.payload.to_bytes(), received_ns, sinks)
+        self._empty_in_turn = 0 if taken else self._empty_in_turn + 1
+        if self._empty_in_turn >= _EMPTY_IN_TURN:
+            self._drain_at = now + _MAX_INTERVAL_S
+            return QUIET
         return 1.0 if taken == _MAX_BATCH else taken / self._ring
+
+    def drain_if_due(self, sinks: Iterable[Sink]) -> float:
+        """Do the same, but seldom while the ring is empty."""
+        return self.drain(sinks) if time.monotonic() >= self._drain_at else QUIET
 
     def close(self) -> None:
         """End the subscription."""
@@ -279,12 +299,18 @@ class RobotSubscriptions:
         self._sinks: dict[Sink, tuple[frozenset[str], Counter[str]]] = {}
         self._sinks_of: dict[str, tuple[Sink, ...]] = {}
 
-    def drain(self) -> float:
-        """Deliver received messages to the sinks; return how full the fullest ring was."""
-        if not self._sinks:
-            return 0.0
-        full = max((topic.drain(self._sinks_of[name]) for name, topic in self._topics.items()), default=0.0)
-        if full:
+    def drain(self) -> None:
+        """Deliver all received messages to the sinks."""
+        for name, each in self._topics.items():
+            each.drain(self._sinks_of[name])
+        for sink in self._sinks:
+            sink.drained()
+
+    def drain_due(self) -> float:
+        """Deliver received messages to the sinks; return how full the fullest ring was, or `QUIET`."""
+        looked = (each.drain_if_due(self._sinks_of[name]) for name, each in self._topics.items())
+        full = max(looked, default=QUIET)
+        if full > 0.0:
             for sink in self._sinks:
                 sink.drained()
         return full
@@ -361,13 +387,13 @@ class Subscriptions:
         while not self._closed.wait(wait_s):
             begun = time.monotonic()
             with self.lock:
-                full = max((self._drain(each, begun) for each in tuple(self._robots.values())), default=0.0)
+                full = max((self._drain(each, begun) for each in tuple(self._robots.values())), default=QUIET)
             wait_s = interval_s(time.monotonic() - begun, full)
 
     def _drain(self, robot: RobotSubscriptions, now_s: float) -> float:
         """Drain a robot's rings; an error must not end other robots' recordings."""
         try:
-            return robot.drain()
+            return robot.drain_due()
         except Exception:
             if now_s >= self._log_at:
                 self._log_at = now_s + _LOG_INTERVAL_S
@@ -380,10 +406,12 @@ def interval_s(took_s: float, full: float) -> float:
 
     Args:
         took_s: Duration of the last draining.
-        full: How full the fullest ring was then, as a share of its places.
+        full: How full the fullest ring was then, as a share of its places; `QUIET`: all were.
     """
     if full >= 0.25:
         return _MIN_INTERVAL_S
+    if full == QUIET:
+        return _MAX_INTERVAL_S
     return min(max(_DRAIN_EVERY_S, took_s / _MAX_BUSY - took_s), _MAX_INTERVAL_S)
 
 

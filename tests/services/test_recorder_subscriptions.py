@@ -1,6 +1,7 @@
 """Subscriptions of the recorder: delivery to sinks, first messages of a file, sequence numbers and times."""
 
 import asyncio
+import contextlib
 import time
 from types import SimpleNamespace
 
@@ -17,7 +18,7 @@ from services.recorder import subscriptions
 from services.recorder.disk import RecordingLevel
 from services.recorder.file_writer import CaptureSink
 from services.recorder.settings import Flight
-from services.recorder.subscriptions import interval_s
+from services.recorder.subscriptions import QUIET, interval_s
 from tests.conftest import run
 from tests.recordings import KEY_PICTURE, PICTURE, START_NS
 from tests.services.recording import (
@@ -344,8 +345,39 @@ def test_a_history_with_events_before_the_first_live_one_is_recorded_whole(mesh)
     assert not +lost
 
 
+def test_the_end_of_a_recording_takes_also_what_is_in_a_ring_that_is_seldom_drained(mesh, monkeypatch):
+    async def main():
+        async with open_session(mesh) as service, open_session(mesh) as other:
+            subscribed = subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored)
+            seldom, sink = asyncio.Event(), Sink()
+            with monkeypatch.context() as patch, contextlib.closing(subscribed):
+                patch.setattr(subscriptions, "_MAX_INTERVAL_S", 3600.0)
+                loop, of_time = asyncio.get_running_loop(), subscriptions.interval_s
+
+                def interval(took_s, full):
+                    if full == QUIET and sink.attached:
+                        loop.call_soon_threadsafe(seldom.set)
+                    return of_time(took_s, full)
+
+                sink.attached = False
+                patch.setattr(subscriptions, "interval_s", interval)
+                with subscribed.lock:
+                    robot = subscribed.robot("arm")
+                    robot.attach(sink, frozenset({"joints"}))
+                    sink.attached = True
+                await seldom.wait()
+                while not sink.taken:  # until the router knows the subscriber
+                    other.zenoh_session.put(JOINTS, b"", attachment=pack(Header(7, 1, 1)))
+                    await asyncio.sleep(0.02)
+                    with subscribed.lock:
+                        robot.drain()
+
+    run(main())
+
+
 def test_a_ring_that_fills_is_drained_at_once_however_busy_the_thread_is():
     # 100,000 joint states a second: the ring of 2,000 places would overflow in the longest interval.
     assert interval_s(took_s=0.006, full=0.5) < 0.001
     assert interval_s(took_s=0.006, full=0.1) == pytest.approx(0.02)
     assert interval_s(took_s=0.0, full=0.0) == pytest.approx(0.004)
+    assert interval_s(took_s=0.0, full=QUIET) == pytest.approx(0.02)
