@@ -131,6 +131,20 @@ def test_robots_on_the_mesh_are_completed_with_their_site_where_the_name_needs_i
 
 
 @pytest.mark.slow
+def test_the_limit_of_time_ends_with_the_search_for_robots():
+    # A slow exit used to be ended by the alarm.
+    script = """
+import signal, types
+from services.command_line.terminal import completion, discovery
+discovery.run = lambda found: (found.close(), set())[1]
+completion.robot_names(types.SimpleNamespace(params={"connect": ""}), "")
+print(signal.getitimer(signal.ITIMER_REAL)[0])
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout == "0.0\n"
+
+
+@pytest.mark.slow
 def test_without_a_router_no_robot_is_completed_and_nothing_is_said():
     assert completed("monitor", "", connect=f"tcp/127.0.0.1:{free_port()}") == []
 

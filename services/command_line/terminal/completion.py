@@ -32,6 +32,9 @@ def robot_names(ctx: typer.Context, incomplete: str) -> list[str]:
         found = discovery.run(present())
     except RobomeshError:
         return []
+    finally:
+        # At the end Python forgets the handler, and a late alarm would end it with a message in the shell.
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
     names = [robot for _, robot in found]
     # A name that two sites use needs its site.
     both = {f"{site}/{robot}" for site, robot in found if "/" in incomplete or names.count(robot) > 1}
