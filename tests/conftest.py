@@ -5,6 +5,7 @@ import gc
 import inspect
 import logging
 import sys
+import time
 from collections import Counter
 from collections.abc import Coroutine, Iterable, Iterator
 from pathlib import Path
@@ -16,6 +17,7 @@ from google.protobuf.message import Message
 from hypothesis import HealthCheck, settings
 
 from robomesh.contract.endpoints import router_config
+from robomesh.contract.header import Header
 from robomesh.publications.publisher import Publisher
 from robomesh.wire.session import Session, SessionSettings
 from tests import distribution
@@ -66,7 +68,7 @@ async def last_value(session: Session, key: str) -> Any:
 def put_unheard(publisher: Publisher, message: Message) -> None:
     """Publish a message without a subscriber, as in an outage; only the publisher's history has it."""
     publisher._sequence += 1
-    header = publisher._history[-1][0]._replace(sequence=publisher._sequence)
+    header = Header(publisher._identity, publisher._sequence, time.time_ns())
     publisher._history.append((header, message.SerializeToString()))
 
 
