@@ -12,6 +12,7 @@ EXAMPLE_ROBOTS_LOCK = ROOT / "example-robots.lock"
 # Extras that `up` leaves out, and how large they are installed.
 PARTS = {
     "step": "the reader of STEP files, 99 MB",
+    "dxf": "the reader of DXF files, 42 MB",
     "plots": "matplotlib, 60 MB",
     "foxglove": "the Foxglove bridge, 53 MB",
     "rerun": "Rerun and its viewer, 500 MB",
@@ -22,7 +23,7 @@ EXAMPLE_ROBOTS = "example-robots"
 # Everything that requirements.lock names. Only this part holds the group dev.
 BENCH = "bench"
 SIZES = {
-    "site": "what a site needs, 650 MB",
+    "site": "what a site needs, 610 MB",
     **PARTS,
     EXAMPLE_ROBOTS: "robots to try, 131 MB",
     BENCH: "what the tests and checks need, 1.2 GB",

@@ -12,7 +12,7 @@ EXTRAS = {
     "collada": "meshes",
     "cryptography": "keys",
     "cv2": "renderer",
-    "ezdxf": "meshes",
+    "ezdxf": "dxf",
     "fast_simplification": "meshes",
     "foxglove": "foxglove",
     "matplotlib": "plots",
@@ -28,7 +28,7 @@ EXTRAS = {
     "websockets": "console",
 }
 # What `./dev add` brings in a checkout; it has the other extras.
-ADDED_IN_CHECKOUT = {"foxglove", "plots", "rerun", "ros2", "step"}
+ADDED_IN_CHECKOUT = {"dxf", "foxglove", "plots", "rerun", "ros2", "step"}
 _CHECKOUT = (Path(__file__).resolve().parents[1] / "dev").is_file()
 
 

@@ -10,7 +10,9 @@ import pytest
 from deploy.locked_parts import PARTS
 from robomesh import extras
 from robots.checks.plot import plot_check
+from robots.programs.dxf import DxfPath, program_from_dxf
 from robots.schema.errors import SaveError, ShapeError
+from robots.shapes.files.dxf import read_dxf
 from robots.shapes.files.step import read_step
 
 ROOT = Path(__file__).parents[2]
@@ -44,6 +46,15 @@ def test_a_step_file_without_its_reader_is_rejected_with_the_command(monkeypatch
     path.write_text("ISO-10303-21;")
     with pytest.raises(ShapeError, match=r"needs the package cascadio, .* add step"):
         read_step(path)
+
+
+@pytest.mark.parametrize("read", [read_dxf, lambda path: program_from_dxf(path, DxfPath())])
+def test_a_dxf_file_without_its_reader_is_rejected_with_the_command(monkeypatch, tmp_path, read):
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
+    path = tmp_path / "box.dxf"
+    path.write_text("0\nEOF\n")
+    with pytest.raises(ShapeError, match=r"needs the package ezdxf, .* add dxf"):
+        read(path)
 
 
 def test_a_plot_without_matplotlib_is_rejected_with_the_command(monkeypatch, tmp_path):

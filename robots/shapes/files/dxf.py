@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from robomesh.extras import is_missing, missing
 from robots.schema.errors import ShapeError
 from robots.shapes.files.declared_size import content
 from robots.shapes.geometry import Color, FloatArray, Geometry, IndexArray, Material, Part, Wire, welded
@@ -127,7 +128,13 @@ def read_dxf(path: Path) -> Geometry:
 
 
 def open_drawing(path: Path) -> tuple[Any, list[str]]:
-    """Return ezdxf's drawing and warnings about the file; any exception of ezdxf passes through."""
+    """Return ezdxf's drawing and warnings about the file; any exception of ezdxf passes through.
+
+    Raises:
+        ShapeError: If ezdxf is not installed.
+    """
+    if is_missing("ezdxf"):
+        raise ShapeError(path, missing("ezdxf"))
     ezdxf = _ezdxf()
     errors: Any = importlib.import_module("ezdxf.lldxf.const")
     logging.getLogger("ezdxf").setLevel(logging.CRITICAL)

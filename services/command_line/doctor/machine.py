@@ -39,6 +39,7 @@ _EXTRAS = {
     "ros2": ("rosbags",),
     "plots": ("matplotlib",),
     "step": ("cascadio",),
+    "dxf": ("ezdxf",),
 }
 _FREE_BYTES = 1 << 30
 _OTHER = "choose another address in the site file"
