@@ -212,6 +212,10 @@ class _Renderer:
         self._reset_if_unwatched()
         self._wake.set()
 
+    @property
+    def coarse(self) -> bool:
+        return self._scheduler.coarse
+
     async def draw(self, stream: str, spec: ViewSpec, composition: Composition) -> Drawn:
         return await _in(
             self._drawing,

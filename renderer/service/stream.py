@@ -36,6 +36,10 @@ _MOST_ASKERS = 64
 class StreamHost(Protocol):
     """The renderer's functions that a stream uses."""
 
+    @property
+    def coarse(self) -> bool:
+        """True while pictures are drawn without anti-aliasing."""
+
     def ages(self, state: RobotState) -> Ages:
         """Return the current ages of a robot's topics."""
 
@@ -83,8 +87,9 @@ class Stream:
         self._video_watched = self._image_watched = False
         self._drawn_version: tuple[int, ...] = ()
         self._at_full_rate = 0  # pictures left of `_MEASURED_PICTURES`
-        # The picture that these repeat, and what it shows.
-        self._repeated: tuple[tuple[object, ...], Drawn] | None = None
+        # What the last picture shows, and that picture, once a second one shows the same.
+        self._shown: tuple[object, ...] = ()
+        self._repeated: Drawn | None = None
         self._next_frame_at = self._drawn_at = self._image_at = self._not_before = -math.inf
         self._last_image: CompressedImage | None = None
         self._still: asyncio.Task[None] | None = None
@@ -178,7 +183,9 @@ class Stream:
             robot, *neighbours = map(self._snapshot, (state, *self._host.neighbours(state)))
             composition = compose(self.spec, appearance, robot, neighbours)
             source_time_ns, dated_by = state.source_time_ns or time.time_ns(), state.dated_by
-            drawn = await self._draw(composition, (self._version(), *map(looks, (robot, *neighbours))))
+            drawn = await self._draw(
+                composition, (self._version(), self._host.coarse, *map(looks, (robot, *neighbours)))
+            )
         except Exception as error:
             self._failed(now, error)
             return _nothing()
@@ -202,17 +209,19 @@ class Stream:
         return self._publish(now, drawn, job, source_time_ns, dated_by)
 
     async def _draw(self, composition: Composition, shown: tuple[object, ...]) -> Drawn:
-        """Draw, or copy the last picture while pictures follow a key frame and show the same.
+        """Draw, or copy the picture if two have shown the same, as of an arm at rest.
 
         Drawing takes most of a picture's time without a GPU; the overlay is written in each picture.
         """
-        if not self._at_full_rate or composition.follow or self.spec.show is not None:
-            self._repeated = None
-            return await self._host.draw(self.name, self.spec, composition)
-        if self._repeated is None or self._repeated[0] != shown:
-            self._repeated = shown, await self._host.draw(self.name, self.spec, composition)
-        drawn = self._repeated[1]
-        return replace(drawn, picture=drawn.picture.copy())
+        trail = self.spec.show is not None and self.spec.show.trail
+        again = shown == self._shown and not trail
+        if not again:
+            self._shown, self._repeated = shown, None
+        if (drawn := self._repeated) is None:
+            drawn = await self._host.draw(self.name, self.spec, composition)
+            if again and shown == self._shown:  # not of another picture meanwhile
+                self._repeated = drawn
+        return replace(drawn, picture=drawn.picture.copy()) if again else drawn
 
     def _snapshot(self, state: RobotState) -> RobotSnapshot:
         return RobotSnapshot(state, self._host.ages(state))

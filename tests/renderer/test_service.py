@@ -236,10 +236,8 @@ async def test_a_robot_at_rest_is_drawn_about_twice_a_second(mesh, tmp_path):
         assert last - first > 1.2e9  # four pictures; a moving arm would have fifty
 
 
-async def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_full_rate(
-    mesh, tmp_path, monkeypatch
-):
-    """ffmpeg shows nothing before it has 21 pictures, at two a second after 10 s. Most repeat a drawn one."""
+def counted_pictures(monkeypatch):
+    """Return a list that grows with each picture that is drawn."""
     drawn = []
     draw = Studio.draw
 
@@ -248,6 +246,14 @@ async def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_f
         return draw(self, *given, **named)
 
     monkeypatch.setattr(Studio, "draw", counted)
+    return drawn
+
+
+async def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_full_rate(
+    mesh, tmp_path, monkeypatch
+):
+    """ffmpeg shows nothing before it has 21 pictures, at two a second after 10 s. Most repeat a drawn one."""
+    drawn = counted_pictures(monkeypatch)
     async with renderer_site(mesh, tmp_path) as (_, monitor):
         await picture(monitor)
         video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
@@ -260,6 +266,34 @@ async def test_pictures_of_a_robot_at_rest_follow_a_requested_key_frame_at_the_f
         messages = await frames(video, stream._MEASURED_PICTURES)
         assert messages[-1][0].received - messages[0][0].received < 8.0
         assert len(drawn) - before < stream._MEASURED_PICTURES / 2
+
+
+async def test_a_picture_of_a_robot_at_rest_is_drawn_once_and_the_next_motion_is_drawn(
+    mesh, tmp_path, monkeypatch
+):
+    drawn = counted_pictures(monkeypatch)
+    async with renderer_site(mesh, tmp_path) as (robot, monitor):
+        publisher = robot.declare_publisher("hall", "arm", "joints")
+        pose = [HOME]
+
+        async def publish():
+            while True:
+                publisher.put(joints(pose[0]))
+                await asyncio.sleep(0.05)
+
+        task = asyncio.create_task(publish())
+        video = monitor.subscribe("robomesh/hall/arm/video/front", newest=100, history=False)
+        await frames(video, stream._MEASURED_PICTURES + 4)
+        at_rest = len(drawn)
+        messages = await frames(video, 4)
+        assert len(drawn) == at_rest
+        stamps = [message.timestamp.ToNanoseconds() for _, message in messages]
+        assert stamps == sorted(set(stamps)), "a repeated picture has the time of the newest state"
+        pose[0] = [each + 0.3 for each in HOME]
+        async with asyncio.timeout(40):
+            while len(drawn) == at_rest:
+                await frames(video, 1)
+        task.cancel()
 
 
 async def test_a_robot_without_new_states_turns_grey_and_shows_their_age(mesh, tmp_path):
