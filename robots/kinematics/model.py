@@ -12,6 +12,9 @@ from robots.kinematics.joints import FloatArray, Joints, as_positions, joints_of
 from robots.kinematics.kinematic_tree import TreeJoint, named_frames, position_factors, tree_of
 from robots.schema.robot_toml import JointType, RobotDescription
 
+Pose = tuple[float, float, float, float, float, float, float]
+"""Position x, y, z [m], and orientation as a unit quaternion x, y, z, w; w >= 0."""
+
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
@@ -133,6 +136,26 @@ def all_placements(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
     return _placements(model, (*model._link_ids, *model._frame_ids))
 
 
+def all_poses(model: RobotModel, joint_positions: ArrayLike, base_to_site: FloatArray) -> list[Pose]:
+    """Return `all_placements` in the site's frame, as poses.
+
+    Args:
+        joint_positions: (n,) joint positions [rad] or [m].
+        base_to_site: (4, 4) placement of the base.
+
+    Raises:
+        JointCountError: If there is not one value per joint.
+    """
+    _forward(model, joint_positions)
+    base, placed = pin.SE3(base_to_site), model._workspace.oMf
+    return [_pose(base * placed[frame]) for frame in (*model._link_ids, *model._frame_ids)]
+
+
+def pose_of(placement: FloatArray) -> Pose:
+    """Return a placement (4, 4) as a pose."""
+    return _pose(pin.SE3(placement))
+
+
 def tool_placement(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
     """Return the placement of the tool: (4, 4), tool to base.
 
@@ -190,6 +213,12 @@ def all_positions(model: RobotModel, joint_positions: ArrayLike) -> FloatArray:
 def _forward(model: RobotModel, joint_positions: ArrayLike) -> None:
     positions = all_positions(model, joint_positions)
     pin.framesForwardKinematics(model._pinocchio, model._workspace, positions)
+
+
+def _pose(placement: Any) -> Pose:
+    x, y, z, *turn = pin.SE3ToXYZQUATtuple(placement)
+    i, j, k, w = turn if turn[3] >= 0.0 else (-each for each in turn)
+    return x, y, z, i, j, k, w
 
 
 def _placements(model: RobotModel, frames: Sequence[int]) -> FloatArray:

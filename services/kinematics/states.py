@@ -13,8 +13,11 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from robomesh.schemas import robomesh_pb2 as schema
 from robots.kinematics.joints import FloatArray, Joints, constraint_values
 from robots.kinematics.model import (
+    Pose,
     RobotModel,
     all_placements,
+    all_poses,
+    pose_of,
     tool_jacobian,
     tool_placement,
 )
@@ -73,9 +76,9 @@ class FramesMessage:
             fixtures: (4, 4) placements in the site's frame to include, by name.
         """
         if positions is not self._positions:
-            placements = self._base_to_site @ all_placements(self._model, positions)[self._numbers]
-            for row, placement in zip(self._rows, placements.tolist(), strict=True):
-                _fill(row, placement)
+            poses = all_poses(self._model, positions, self._base_to_site)
+            for row, number in zip(self._rows, self._numbers, strict=True):
+                _fill(row, poses[number])
             self._positions = positions
         for _, _, at in self._rows:
             at.seconds, at.nanos = timestamp.seconds, timestamp.nanos
@@ -85,7 +88,7 @@ class FramesMessage:
         message.CopyFrom(self._message)
         for name, fixture in fixtures.items():
             row = self._added(message, f"{self._site}/{name}")
-            _fill(row, fixture.tolist())
+            _fill(row, pose_of(fixture))
             row[2].CopyFrom(timestamp)
         return message
 
@@ -94,31 +97,9 @@ class FramesMessage:
 _Row = tuple[Vector3, Quaternion, Timestamp]
 
 
-def _fill(row: _Row, placement: Sequence[Sequence[float]]) -> None:
+def _fill(row: _Row, pose: Pose) -> None:
     to, turn, _ = row
-    to.x, to.y, to.z = placement[0][3], placement[1][3], placement[2][3]
-    turn.x, turn.y, turn.z, turn.w = quaternion(placement)
-
-
-def quaternion(rotation: Sequence[Sequence[float]]) -> tuple[float, float, float, float]:
-    """Convert a rotation matrix, or the upper left of a placement, to a unit quaternion x, y, z, w; w >= 0.
-
-    Source: Shepperd 1978: from the largest of the four, so that half turns are exact, too.
-    """
-    (xx, xy, xz, *_), (yx, yy, yz, *_), (zx, zy, zz, *_), *_ = rotation
-    # Four times each of the quaternion's products with its largest element.
-    largest = max(xx, yy, zz, xx + yy + zz)
-    if largest == xx:
-        found = 1.0 + xx - yy - zz, yx + xy, xz + zx, zy - yz
-    elif largest == yy:
-        found = yx + xy, 1.0 - xx + yy - zz, zy + yz, xz - zx
-    elif largest == zz:
-        found = xz + zx, zy + yz, 1.0 - xx - yy + zz, yx - xy
-    else:
-        found = zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz
-    x, y, z, w = found
-    length = math.copysign(math.hypot(x, y, z, w), w)
-    return x / length, y / length, z / length, w / length
+    to.x, to.y, to.z, turn.x, turn.y, turn.z, turn.w = pose
 
 
 class StateMessage:
@@ -130,49 +111,53 @@ class StateMessage:
 
     def __init__(self, model: RobotModel, *, reach: float) -> None:
         self._model, self._reach = model, reach
+        joints = model.joints
+        names = (*joints.names, *("+".join(each.names) for each in joints.constraints))
+        self._lower = np.array([*joints.lower, *(each.lower for each in joints.constraints)])
+        self._upper = np.array([*joints.upper, *(each.upper for each in joints.constraints)])
+        self._message = schema.KinematicState(limit_margins=[{"name": name} for name in names])
+        self._margins = [*self._message.limit_margins]
         self._positions: FloatArray | None = None
 
     def filled(
         self, positions: FloatArray, velocities: FloatArray | None, timestamp: Timestamp
     ) -> schema.KinematicState:
-        """Return a new message.
+        """Return the message without a clearance; the next call changes it.
 
         Args:
             positions: (n,) [rad] or [m]; the last call's array gets its pose and margins.
             velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
         """
+        message = self._message
+        message.timestamp.CopyFrom(timestamp)
         if positions is not self._positions:
-            self._jacobian = tool_jacobian(self._model, positions)
-            self._placed = _placed_state(self._model, positions, self._jacobian, self._reach)
+            self._place(positions)
             self._positions = positions
-        message = schema.KinematicState(timestamp=timestamp)
-        message.MergeFrom(self._placed)
-        if velocities is not None:
+        if velocities is None:
+            message.ClearField("linear_velocity")
+            message.ClearField("angular_velocity")
+        else:
             twist = (self._jacobian @ velocities).tolist()
             _set(message.linear_velocity, twist[:3])
             _set(message.angular_velocity, twist[3:])
+        for name in ("clearance", "own_clearance", "not_counted"):
+            message.ClearField(name)
         return message
 
-
-def _placed_state(
-    model: RobotModel, positions: FloatArray, jacobian: FloatArray, reach: float
-) -> schema.KinematicState:
-    """Return what depends on an arm's positions alone."""
-    joints = model.joints
-    manipulable, margin = dexterity(jacobian, joints.types, reach=reach)
-    message = schema.KinematicState(manipulability=manipulable, singularity_margin=margin)
-    message.tool_to_base.extend(tool_placement(model, positions).ravel().tolist())
-    for name, position, lower, upper in zip(
-        joints.names, positions.tolist(), joints.lower.tolist(), joints.upper.tolist(), strict=True
-    ):
-        message.limit_margins.add(name=name, lower=position - lower, upper=upper - position)
-    for constraint, total in zip(
-        joints.constraints, constraint_values(joints, positions).tolist(), strict=True
-    ):
-        message.limit_margins.add(
-            name="+".join(constraint.names), lower=total - constraint.lower, upper=constraint.upper - total
+    def _place(self, positions: FloatArray) -> None:
+        """Fill in what depends on the positions alone."""
+        message, joints = self._message, self._model.joints
+        self._jacobian = tool_jacobian(self._model, positions)
+        message.manipulability, message.singularity_margin = dexterity(
+            self._jacobian, joints.types, reach=self._reach
         )
-    return message
+        message.tool_to_base[:] = tool_placement(self._model, positions).ravel().tolist()
+        values = positions
+        if joints.constraints:
+            values = np.concatenate([positions, constraint_values(joints, positions)])
+        above, below = (values - self._lower).tolist(), (self._upper - values).tolist()
+        for margin, lower, upper in zip(self._margins, above, below, strict=True):
+            margin.lower, margin.upper = lower, upper
 
 
 def add_proximity(message: schema.KinematicState, proximity: Proximity, *, site: str) -> None:
