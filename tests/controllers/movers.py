@@ -275,10 +275,7 @@ class UnitMover(Mover):
 
     async def _say(self, text):
         """Send a unit as another client."""
-        _, writer = await asyncio.open_connection("127.0.0.1", self.wires[""].target)
-        writer.write(text)
-        await writer.drain()
-        writer.close()
+        await say(self.wires[""].target, text)
 
     async def start_foreign(self):
         target = [math.degrees(each) for each in self.positions()]
@@ -303,6 +300,16 @@ class UnitMover(Mover):
 
     def free_seat(self):
         self.end_fault("refuse")
+
+
+async def say(port, text):
+    """Send a text as another client."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(text)
+    writer.write_eof()
+    # Closed with an answer that nobody read, the connection would be reset, and the text might be lost.
+    await reader.read()
+    writer.close()
 
 
 async def replaced(arm):
@@ -407,10 +414,7 @@ class UrMover(Mover):
         self.arm.programs.stop(time.monotonic())
 
     async def stop_elsewhere(self):
-        _, writer = await asyncio.open_connection("127.0.0.1", self.wires["dashboard"].target)
-        writer.write(b"stop\n")
-        await writer.drain()
-        writer.close()
+        await say(self.wires["dashboard"].target, b"stop\n")
 
     async def slow_down(self):
         self.arm.write({"speed_slider_mask": 1, "speed_slider_fraction": 0.5}, time.monotonic())
