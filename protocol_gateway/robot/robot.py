@@ -448,7 +448,9 @@ class Robot:
         return True
 
     def _on_activity(self, activity: Activity | None, dated_s: float) -> None:
-        self._control.handle(events.StatusReported(activity, dated_s))
+        # It can only end a motion; each unit would cost a snapshot of the controller.
+        if self._control.authority.motion is not None:
+            self._control.handle(events.StatusReported(activity, dated_s))
 
     def _stop_expected(self, now_s: float) -> bool:
         """Return whether the controller may report a stop that the gateway has sent."""
