@@ -439,10 +439,13 @@ async def test_no_old_picture_is_sent_after_drawing_has_failed(mesh, tmp_path, m
             return super().draw(*args, **options)
 
     monkeypatch.setattr(renderer, "Studio", Breaking)
-    async with renderer_site(mesh, tmp_path) as (_, monitor):
+    async with renderer_site(mesh, tmp_path) as (robot, monitor):
+        publisher = robot.declare_publisher("hall", "arm", "joints")
         await picture(monitor)
         broken.set()
         async with asyncio.timeout(40):
+            # One that shows the same is not drawn again.
+            publisher.put(joints(HOME))
             while await monitor.last("robomesh/hall/arm/image/front", timeout_s=0.5) is not None:
                 pass
 
