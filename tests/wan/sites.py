@@ -72,6 +72,7 @@ name = "arm"
 model = "pt600"
 controller = "tcp://127.0.0.1:5400"
 stop_proven = true
+thin_at_rest = false  # as if it moved all the time
 """
 
 
