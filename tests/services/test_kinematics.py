@@ -1,6 +1,7 @@
 """Kinematics service: frames against the D-H product, twist against differences, last values stay old."""
 
 import asyncio
+import time
 from contextlib import asynccontextmanager
 
 import numpy as np
@@ -175,6 +176,35 @@ async def test_frames_keep_their_rate_and_a_last_value_publishes_none(mesh):
             assert all(sample.live for sample in live)
             spread_s = (live[-1].header.source_time_ns - live[0].header.source_time_ns) * 1e-9
             assert len(live) / spread_s < 66
+
+
+async def test_an_arm_whose_encoders_flicker_stays_and_one_that_creeps_is_followed(mesh):
+    async with open_session(mesh) as gateway, kinematics_service(mesh) as session:
+        joints = gateway.declare_publisher("hall", "arm", "joints")
+        frames = session.subscribe("robomesh/hall/arm/frames", newest=100)
+        states = session.subscribe("robomesh/hall/arm/kinematics", newest=100)
+        while not joints.watched:
+            await asyncio.sleep(0.01)
+        began_ns = time.time_ns()
+
+        async def shown(number, position):
+            """Return the messages without their time, and the position by its margin."""
+            message = states_of([position, 0.0, 0.0, 0.0, 0.0])
+            joints.put(message, source_time_ns=began_ns + number * 100_000_000)
+            frame, state = (await anext(frames)).message(), (await anext(states)).message()
+            lower = build_model(load("pt600")).joints.lower[0]
+            placed = [(each.translation.x, each.translation.y, each.rotation.z) for each in frame.transforms]
+            return placed, state.limit_margins[0].lower + lower, state.linear_velocity.y
+
+        first = await shown(0, 0.5)
+        for number in range(1, 6):
+            flickered = await shown(number, 0.5 + 1e-5 * (number % 3 - 1))
+            assert flickered[:2] == first[:2]
+            assert flickered[2] or number == 1, "the velocity is of the joint states"
+        for number in range(6, 30):
+            placed, position, _ = await shown(number, 0.5 + 1e-5 * (number - 5))
+            assert abs(position - (0.5 + 1e-5 * (number - 5))) < 4.5e-5
+        assert placed != first[0]
 
 
 async def test_joint_states_that_do_not_match_the_description_publish_no_frames(mesh):
