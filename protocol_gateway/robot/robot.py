@@ -448,7 +448,7 @@ class Robot:
         return True
 
     def _on_activity(self, activity: Activity | None, dated_s: float) -> None:
-        # It can only end a motion; each unit would cost a snapshot of the controller.
+        # A status can only end a motion. To handle one costs a snapshot of the controller.
         if self._control.authority.motion is not None:
             self._control.handle(events.StatusReported(activity, dated_s))
 

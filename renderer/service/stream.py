@@ -87,7 +87,7 @@ class Stream:
         self._video_watched = self._image_watched = False
         self._drawn_version: tuple[int, ...] = ()
         self._at_full_rate = 0  # pictures left of `_MEASURED_PICTURES`
-        # What the last picture shows, and that picture, once a second one shows the same.
+        # What the last picture shows; and that picture, kept from the second one on that shows the same.
         self._shown: tuple[object, ...] = ()
         self._repeated: Drawn | None = None
         self._next_frame_at = self._drawn_at = self._image_at = self._not_before = -math.inf
@@ -209,7 +209,7 @@ class Stream:
         return self._publish(now, drawn, job, source_time_ns, dated_by)
 
     async def _draw(self, composition: Composition, shown: tuple[object, ...]) -> Drawn:
-        """Draw, or copy the picture if two have shown the same, as of an arm at rest.
+        """Draw, or copy the last picture if this one shows the same, as of an arm at rest.
 
         Drawing takes most of a picture's time without a GPU; the overlay is written in each picture.
         """

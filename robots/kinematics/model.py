@@ -151,7 +151,7 @@ def all_poses(model: RobotModel, joint_positions: ArrayLike, base_to_site: Float
     return [_pose(base * placed[frame]) for frame in (*model._link_ids, *model._frame_ids)]
 
 
-def pose_of(placement: FloatArray) -> Pose:
+def placement_pose(placement: FloatArray) -> Pose:
     """Return a placement (4, 4) as a pose."""
     return _pose(pin.SE3(placement))
 

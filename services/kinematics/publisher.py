@@ -40,8 +40,8 @@ from services.kinematics.states import (
 
 log = logging.getLogger(__name__)
 
-# Smaller changes of a joint [rad] or [m] are its encoder's noise, less than an arm repeats: the arm is where
-# it was. An arm at rest is computed once.
+# Smaller changes of a joint [rad] or [m] are the noise of its encoder, below the repeatability of an arm: the
+# last computed positions stay, so an arm at rest is computed once.
 _NOISE = 4e-5
 # Velocities are not computed from an older previous state.
 _LONGEST_DIFFERENCE_S = 0.5
@@ -186,9 +186,9 @@ class ArmPublisher:
     def _add_cell(
         self, state: schema.KinematicState, built: Cell | None, positions: FloatArray
     ) -> Proximity | None:
-        """Add to a state what the arm's cell knows.
+        """Add to a state whether its joints are unproven, and the clearances, and return these.
 
-        The clearances are None until the hulls are built, and for an arm whose joints are unproven.
+        They are None until the hulls are built, and for an arm whose joints are unproven.
         """
         name = self._arm.name
         state.joints_unproven = self._cell_state.is_unproven(name)

@@ -17,7 +17,7 @@ from robots.kinematics.model import (
     RobotModel,
     all_placements,
     all_poses,
-    pose_of,
+    placement_pose,
     tool_jacobian,
     tool_placement,
 )
@@ -72,7 +72,7 @@ class FramesMessage:
         """Return the placements in the site's frame; the next call changes a message without fixtures.
 
         Args:
-            positions: (n,) joint positions [rad] or [m]; the last call's array gets its placements.
+            positions: (n,) joint positions [rad] or [m]; the array of the last call is not computed again.
             fixtures: (4, 4) placements in the site's frame to include, by name.
         """
         if positions is not self._positions:
@@ -88,7 +88,7 @@ class FramesMessage:
         message.CopyFrom(self._message)
         for name, fixture in fixtures.items():
             row = self._added(message, f"{self._site}/{name}")
-            _fill(row, pose_of(fixture))
+            _fill(row, placement_pose(fixture))
             row[2].CopyFrom(timestamp)
         return message
 
@@ -125,7 +125,7 @@ class StateMessage:
         """Return the message without a clearance; the next call changes it.
 
         Args:
-            positions: (n,) [rad] or [m]; the last call's array gets its pose and margins.
+            positions: (n,) [rad] or [m]; the array of the last call is not computed again.
             velocities: (n,) [rad/s] or [m/s]; None if unknown, then there is no twist.
         """
         message = self._message

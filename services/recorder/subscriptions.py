@@ -33,8 +33,8 @@ _DRAIN_EVERY_S = 0.004
 # Limit of the thread's load: with many robots the interval grows up to a maximum, unless a ring fills.
 _MAX_BUSY = 0.2
 _MAX_INTERVAL_S = 0.02
-# A ring that is found empty so often in turn is drained at the longest interval until something is in it:
-# the joints of an arm that moves are never so far apart, those of one at rest are.
+# A ring that was empty this many times in a row is drained at the longest interval until it has a message.
+# The joint states of a moving arm are never so far apart; those of an arm at rest are.
 _EMPTY_IN_TURN = 5
 # Other threads run for this time while rings fill faster than that.
 _MIN_INTERVAL_S = 0.0005
@@ -45,7 +45,7 @@ _MAX_BATCH = 2048
 _MAX_MISSING = 10_000
 _LOG_INTERVAL_S = 10.0
 QUIET = -1.0
-"""In place of how full a ring is: it has been empty for some time."""
+"""Returned in place of how full a ring is, for a ring that has been empty for some time."""
 # Limit of a view's frames since its newest key frame, and what each needs besides its payload, about.
 _MAX_PREAMBLE_BYTES, _FRAME_BYTES = 16 << 20, 200
 _REPLY_TIMEOUT_S = 2.0
@@ -178,7 +178,7 @@ class _TopicSubscription:
         return 1.0 if taken == _MAX_BATCH else taken / self._ring
 
     def drain_if_due(self, sinks: Iterable[Sink]) -> float:
-        """Do the same, but seldom while the ring is empty."""
+        """Drain the ring, but only every `_MAX_INTERVAL_S` while it stays empty."""
         return self.drain(sinks) if time.monotonic() >= self._drain_at else QUIET
 
     def close(self) -> None:

@@ -16,7 +16,7 @@ from robomesh.errors import NoAnswerError
 from robomesh.schemas import robomesh_pb2 as schema
 from robomesh.wire.session import open_session
 from robots.descriptions.description import library_names, load
-from robots.kinematics.model import build_model, pose_of, tool_placement
+from robots.kinematics.model import build_model, placement_pose, tool_placement
 from robots.schema.poses import rpy_rotation
 from services import kinematics
 from services.kinematics.states import FramesMessage, StateMessage
@@ -53,7 +53,7 @@ def dh_product(description, positions):
 def turn_of(rotation):
     placement = np.eye(4)
     placement[:3, :3] = rotation
-    return pose_of(placement)[3:]
+    return placement_pose(placement)[3:]
 
 
 def rotation_of(quaternion):

@@ -33,7 +33,7 @@ def robot_names(ctx: typer.Context, incomplete: str) -> list[str]:
     except RobomeshError:
         return []
     finally:
-        # At the end Python forgets the handler, and a late alarm would end it with a message in the shell.
+        # Python removes the handler at its exit: an alarm then would kill it, with a message in the shell.
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     names = [robot for _, robot in found]
     # A name that two sites use needs its site.
