@@ -183,6 +183,11 @@ def wait_until_declared(session: zenoh.Session, priority: Priority) -> None:
             pass
 
 
+def timed_out(reply: zenoh.Reply) -> bool:
+    """Return whether a reply stands for a queryable that did not answer in time."""
+    return reply.err is not None and reply.err.payload.to_bytes() == b"Timeout"
+
+
 def _listener(endpoint: str) -> str:
     """Return an endpoint to listen on, with small send buffers unless it sets its own."""
     address, _, options = endpoint.partition("#")

@@ -23,7 +23,7 @@ import zenoh.ext
 from google.protobuf.message import Message
 
 from robomesh.contract import keys
-from robomesh.contract.endpoints import wait_until_declared
+from robomesh.contract.endpoints import timed_out, wait_until_declared
 from robomesh.contract.header import Header, unpack
 from robomesh.contract.ignored import PUBLICATION, REPLY, Ignored
 from robomesh.contract.messages import decode
@@ -35,6 +35,9 @@ from robomesh.publications.delay import Delay
 _ZENOH_RING = 1024
 # Wait before a query for the last value [s], because the services of one robot start together.
 _QUERY_AFTER_S = 0.1
+# Time for the answers of a query [s]. A publisher that missed it, because its machine is busy, is queried
+# again with twice the time: some values are published only once.
+_ANSWER_S, _LONGEST_ANSWER_S = 2.0, 32.0
 # How long a reply waits for live samples that it overtook [s].
 _EARLY_S = 0.5
 # Pauses without a sample after which the thread reads again.
@@ -134,6 +137,7 @@ class Subscription:
         self._history = history
         self._closed = False
         self._query_timer: asyncio.TimerHandle | None = None
+        self._queries = 0
         # Live samples that wait for the reply with the list, which must come first.
         self._waiting: deque[zenoh.Sample] | None = None
         if history and self.topic.history in (History.LAST_100, History.KEY_FRAME):
@@ -146,7 +150,7 @@ class Subscription:
         self._thread = threading.Thread(target=self._read, name=f"read {key_expr}")
         self._thread.start()
         if history:
-            self._query(key_expr)
+            self._query(_ANSWER_S)
 
     def __aiter__(self) -> AsyncIterator[Sample]:
         return self
@@ -298,17 +302,21 @@ class Subscription:
         if not self._closed and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self.close)
 
-    def _query_again(self) -> None:
+    def _query_again(self, timeout_s: float = _ANSWER_S) -> None:
         self._query_timer = None
         if not self._closed:
-            self._query(self.key_expr)
+            self._query(timeout_s)
 
-    def _query(self, key_expr: str) -> None:
+    def _query(self, timeout_s: float) -> None:
+        self._queries = number = self._queries + 1
         replies: list[zenoh.Sample] = []
+        late = False
 
         def on_reply(reply: zenoh.Reply) -> None:
+            nonlocal late
             if reply.ok is not None:
                 replies.append(reply.ok)
+            late = late or timed_out(reply)
 
         def on_end() -> None:
             with self._lock:
@@ -322,6 +330,9 @@ class Subscription:
             self._wake()
             if early and not self._loop.is_closed():
                 self._loop.call_soon_threadsafe(self._loop.call_later, _EARLY_S, take_early, early)
+            if late and number == self._queries and not self._loop.is_closed():
+                longer_s = min(2 * timeout_s, _LONGEST_ANSWER_S)
+                self._loop.call_soon_threadsafe(self._query_again, longer_s)
 
         def take_early(early: list[zenoh.Sample]) -> None:
             if self._closed:
@@ -334,13 +345,13 @@ class Subscription:
         wait_until_declared(self._session, self.topic.priority)
         queried_at = time.monotonic()
         self._session.get(
-            key_expr,
+            self.key_expr,
             zenoh.handlers.Callback(on_reply, on_end),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             congestion_control=zenoh.CongestionControl.DROP,
             priority=getattr(zenoh.Priority, self.topic.priority.value),
-            timeout=2.0,
+            timeout=timeout_s,
         )
 
     def _is_early(self, reply: zenoh.Sample) -> bool:

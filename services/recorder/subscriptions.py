@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import zenoh
 import zenoh.ext
 
-from robomesh.contract.endpoints import wait_until_declared
+from robomesh.contract.endpoints import timed_out, wait_until_declared
 from robomesh.contract.header import Header, unpack
 from robomesh.contract.ignored import PUBLICATION, REPLY, Ignored
 from robomesh.contract.keys import robot_key
@@ -48,7 +48,8 @@ QUIET = -1.0
 """Returned in place of how full a ring is, for a ring that has been empty for some time."""
 # Limit of a view's frames since its newest key frame, and what each needs besides its payload, about.
 _MAX_PREAMBLE_BYTES, _FRAME_BYTES = 16 << 20, 200
-_REPLY_TIMEOUT_S = 2.0
+# Time for the answer to a query [s]; a publisher that missed it is queried again with twice the time.
+_ANSWER_S, _LONGEST_ANSWER_S = 2.0, 32.0
 
 
 class Sink(Protocol):
@@ -102,20 +103,27 @@ class _TopicSubscription:
         self._empty_in_turn, self._drain_at = 0, 0.0
         # The ring is not drained before the reply with earlier messages has come, or its timeout.
         self._blocked_until = 0.0
+        self._queries, self._repeat_for_s = 0, 0.0
         self._subscriber = _subscribe(session, key_expr, self.row)
         if self.row.history in (History.LAST_100, History.KEY_FRAME) or self.is_static:
-            self._blocked_until = time.monotonic() + _REPLY_TIMEOUT_S
-            self.query()
+            self._blocked_until = time.monotonic() + _ANSWER_S
+            self._query(_ANSWER_S)
 
-    def query(self) -> None:
-        """Query the publisher for earlier messages."""
+    def _query(self, answer_s: float) -> None:
+        """Query the publisher for earlier messages, and wait for the answer for a time [s]."""
+        self._queries = number = self._queries + 1
+        late = False
 
         def on_reply(reply: zenoh.Reply) -> None:
+            nonlocal late
             if reply.ok is not None:
                 self._replies.append(reply.ok)
+            late = late or timed_out(reply)
 
         def on_end() -> None:
             self._blocked_until = 0.0
+            if late and number == self._queries and not self._is_video:
+                self._repeat_for_s = min(2 * answer_s, _LONGEST_ANSWER_S)
 
         try:
             wait_until_declared(self._session, self.row.priority)
@@ -125,7 +133,7 @@ class _TopicSubscription:
                 consolidation=zenoh.ConsolidationMode.NONE,
                 congestion_control=zenoh.CongestionControl.DROP,
                 priority=getattr(zenoh.Priority, self.row.priority.value),
-                timeout=_REPLY_TIMEOUT_S,
+                timeout=answer_s,
             )
         except zenoh.ZError as error:
             log.warning("%s could not be queried: %s", self.key_expr, error)
@@ -133,7 +141,7 @@ class _TopicSubscription:
     def refresh(self) -> None:
         """Query a service that came online for what it published while the link was down."""
         if self.row.history is History.LAST_100 or self.is_static:
-            self.query()
+            self._query(_ANSWER_S)
 
     def drain(self, sinks: Iterable[Sink]) -> float:
         """Deliver received messages to the sinks.
@@ -141,6 +149,9 @@ class _TopicSubscription:
         Returns:
             How full the ring was, as a share of its places; `QUIET`: it has been empty for some time.
         """
+        if (answer_s := self._repeat_for_s) > 0.0:
+            self._repeat_for_s = 0.0
+            self._query(answer_s)
         now = time.monotonic()
         blocked = now < self._blocked_until  # read first: the reply arrives before it ends
         while self._replies:

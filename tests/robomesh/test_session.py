@@ -15,7 +15,7 @@ from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
 
 from robomesh import reason_codes as codes
 from robomesh.contract.endpoints import client_config, router_config
-from robomesh.contract.header import pack
+from robomesh.contract.header import Header, pack
 from robomesh.errors import NoAnswerError, RefusedError, SessionError
 from robomesh.publications import subscription as subscription_module
 from robomesh.requests.server import Request
@@ -322,6 +322,31 @@ async def test_what_was_published_before_the_subscription_was_known_is_not_lost(
         publisher.put(joints(3))
         await anext(subscription)
         assert subscription.lost(publisher.key) == 5
+
+
+async def test_a_publisher_that_answers_too_late_is_queried_again(mesh, monkeypatch):
+    monkeypatch.setattr(subscription_module, "_ANSWER_S", 0.3)
+    payload = schema.Description(name="busy").SerializeToString()
+    missed, key = [], "robomesh/site/busy/description"
+
+    def answer(query):
+        if len(missed) < 2:
+            missed.append(query)  # while it is kept, Zenoh waits for its answer
+        else:
+            query.reply(key, payload, attachment=pack(Header(7, 1, 0)))
+            query.drop()
+
+    async with open_session(mesh) as busy, open_session(mesh) as quick, open_session(mesh) as monitor:
+        publisher = quick.declare_publisher("site", "quick", "description")
+        publisher.remember(schema.Description(name="quick"), source_time_ns=1)
+        queryable = busy.zenoh_session.declare_queryable(key, answer)
+        try:
+            await answered(monitor, publisher.key)
+            subscription = monitor.subscribe("robomesh/*/*/description", newest=10)
+            assert {(await anext(subscription)).message().name for _ in range(2)} == {"quick", "busy"}
+            assert subscription.lost(key) == 0
+        finally:
+            queryable.undeclare()
 
 
 async def test_first_put_and_get_on_the_second_link_wait_for_their_declarations(mesh):

@@ -223,7 +223,7 @@ def test_a_new_file_takes_older_pictures_only_if_its_decoder_needs_and_can_use_t
 def test_a_recording_begins_with_a_new_picture_and_with_an_old_one_only_to_decode_it(
     mesh, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(subscriptions, "_REPLY_TIMEOUT_S", WITHIN_S)
+    monkeypatch.setattr(subscriptions, "_ANSWER_S", WITHIN_S)
 
     async def main():
         async with recording_site(mesh, tmp_path, views=("front", "top")) as session:
@@ -373,6 +373,32 @@ def test_the_end_of_a_recording_takes_also_what_is_in_a_ring_that_is_seldom_drai
                         robot.drain()
 
     run(main())
+
+
+async def test_a_publisher_that_answers_too_late_is_queried_again(mesh, monkeypatch):
+    monkeypatch.setattr(subscriptions, "_ANSWER_S", 0.3)
+    missed, key = [], "robomesh/site/arm/description"
+
+    def answer(query):
+        if len(missed) < 2:
+            missed.append(query)  # while it is kept, Zenoh waits for its answer
+        else:
+            query.reply(key, b"\n\x03arm", attachment=pack(Header(7, 1, 0)))
+            query.drop()
+
+    async with open_session(mesh) as service, open_session(mesh) as other:
+        queryable = other.zenoh_session.declare_queryable(key, answer)
+        while not await asyncio.to_thread(lambda: [*service.zenoh_session.get(key, timeout=0.3)]):
+            missed.clear()
+        missed.clear()
+        subscribed, sink = subscriptions.Subscriptions(service.zenoh_session, "site", service.ignored), Sink()
+        with contextlib.closing(subscribed):
+            with subscribed.lock:
+                subscribed.robot("arm").attach(sink, frozenset({"description"}))
+            while not sink.taken:
+                await asyncio.sleep(0.02)
+        queryable.undeclare()
+    assert [key for key, _ in sink.taken] == [key]
 
 
 def test_a_ring_that_fills_is_drained_at_once_however_busy_the_thread_is():
