@@ -73,6 +73,9 @@ class Part:
     set_up: str = _SET_UP
 
 
+# A mirror, as of Debian's testing, may be some weeks behind.
+_ANY_AGE = "--aptopt='Acquire::Check-Valid-Until \"false\"'"
+
 PARTS = {
     "debian-12": Part((_SUITE,), debian="bookworm"),
     "debian-13": Part(
@@ -260,7 +263,7 @@ def in_debian(folder: Path, part: Part) -> str:
     # Without this capability a user cannot make namespaces.
     typed_by = f"setpriv --bounding-set -sys_admin --reuid {part.user} --regid {part.user} --init-groups"
     lines = [
-        f"mmdebstrap --quiet --variant=minbase --include={_BARE} {part.debian} {folder}",
+        f"mmdebstrap --quiet {_ANY_AGE} --variant=minbase --include={_BARE} {part.debian} {folder}",
         "mount --make-rprivate /",
         f"mount -t proc proc {folder}/proc",
         f"mount --rbind /dev {folder}/dev",

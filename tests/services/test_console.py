@@ -415,11 +415,11 @@ async def test_a_value_whose_answer_was_lost_is_asked_for_again(mesh, page, monk
     monkeypatch.setattr(shared_subscriptions, "_ASK_AGAIN_S", 0.1)
     query, lost = Subscription._query, []
 
-    def lose_the_first(subscription, key_expr):
-        if key_expr.endswith("/description") and not lost:
-            lost.append(key_expr)
+    def lose_the_first(subscription, timeout_s):
+        if subscription.key_expr.endswith("/description") and not lost:
+            lost.append(subscription.key_expr)
         else:
-            query(subscription, key_expr)
+            query(subscription, timeout_s)
 
     monkeypatch.setattr(Subscription, "_query", lose_the_first)
 
