@@ -23,12 +23,13 @@ class Placed:
         placements: (b, 4, 4) to the site [m].
         before: (b, 4, 4) at the previous sample; at the first sample, equal to `placements`.
         steps: (b,) distance that each body travelled since then [m].
+        joined: Whether the arm moves from the previous sample to this one; see `joined`.
     """
 
-    def __init__(self, placements: FloatArray, before: FloatArray, steps: FloatArray) -> None:
-        self.steps = steps
-        # After a larger step a new path begins: the arm does not move from the previous sample to this one.
-        self.joined = bool(steps.max(initial=0.0) <= SAMPLE_M * ROUND)
+    def __init__(
+        self, placements: FloatArray, before: FloatArray, steps: FloatArray, *, joined: bool
+    ) -> None:
+        self.steps, self.joined = steps, joined
         self._placements, self._before = placements, before
         self._transforms: dict[int, Any] = {}
 
@@ -55,6 +56,16 @@ class Placed:
         )
         before, now = corners_along((body,), seen)[:, 0]
         return float(np.linalg.norm(now - before, axis=1).max())
+
+
+def joined(steps: FloatArray) -> list[bool]:
+    """Return whether the arm moves from the previous sample to each; after a larger step a new path begins.
+
+    Args:
+        steps: (m, b) distances that the bodies travelled since the previous sample [m].
+    """
+    found: list[bool] = (steps.max(axis=1, initial=0.0) <= SAMPLE_M * ROUND).tolist()
+    return found
 
 
 def touching_share(measure: Callable[[float], float], before_m: float, after_m: float, way_m: float) -> float:

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.bodies.geometry import TOUCH_M, Body
-from robots.collision.bisection import Placed, touching_share
+from robots.collision.bisection import Placed, joined, touching_share
 from robots.collision.cell import Arm, Cell
 from robots.collision.distance import Gauge
 from robots.collision.floor import Heights, heights_on_path
 from robots.collision.obstacles import join_boxes, least_distances
 from robots.collision.path import placements_along, travelled
-from robots.collision.swept_volumes import Sweep, distance_to_sweep, sweeps_of, swept_region
+from robots.collision.swept_volumes import Sweep, distance_to_sweep, sweeps_of
 from robots.descriptions.cells import FLOOR, Floor
 from robots.kinematics.joints import FloatArray
 
@@ -90,14 +90,16 @@ def path_encounters(
     travel = travelled(arm.bodies, places)
     gauge = Gauge()
     reach = np.inf if far else within_m + _TOLERANCE_M
-    sweeps = sweeps_of(cell, robot, others, passed=swept_region(arm, places), within_m=reach)
+    sweeps = sweeps_of(cell, robot, others, placements=places, within_m=reach)
     outside = _OutsidePairs(cell, arm, places[0], sweeps, within_m, reach)
     own = _SelfPairs(arm, travel)
     clearances = np.full(len(positions), np.inf)
     found: dict[tuple[str, str], dict[int, _Near]] = {}
-    for sample, row in enumerate(places):
-        last = max(sample - 1, 0)
-        at = Placed(row, places[last], travel[sample] - travel[last])
+    steps = np.diff(travel, axis=0, prepend=travel[:1])
+    before = places[0]
+    for sample, (row, is_joined) in enumerate(zip(places, joined(steps), strict=True)):
+        at = Placed(row, before, steps[sample], joined=is_joined)
+        before = row
         clearances[sample], near = outside.measured(gauge, at, travel[sample])
         for each in (*near, *own.measured(gauge, at, sample)):
             found.setdefault(each.pair, {})[sample] = each
@@ -188,12 +190,14 @@ class _OutsidePairs:
         """Return the least distance of all pairs, and the pairs that are near."""
         nearest = np.inf
         near: list[_Near] = []
-        moved = travel[self._bodies]
-        bounds = self._known - moved
-        if not len(bounds):
+        if not self._pairs:
             return nearest, near
-        close = np.flatnonzero(np.minimum.reduceat(bounds, self._starts) < self._limit)
-        for names, here in [self._groups[group] for group in close.tolist()]:
+        bounds = self._known - travel.take(self._bodies)
+        lowest = int(bounds.argmin())
+        close: list[int] = []
+        if bounds[lowest] < self._limit:
+            close = np.flatnonzero(np.minimum.reduceat(bounds, self._starts) < self._limit).tolist()
+        for names, here in [self._groups[group] for group in close]:
             found: _Measured | None = None
             # Start with the nearest of the last sample: it often is the nearest again, so that others need no
             # measurement.
@@ -205,7 +209,7 @@ class _OutsidePairs:
                 # A bound may be negative, a distance may not.
                 if max(bounds[number], 0.0) >= cutoff:
                     break
-                measured = self._measured(gauge, at, number, bounds[number], moved[number], cutoff)
+                measured = self._measured(gauge, at, number, bounds[number], travel, cutoff)
                 # Beyond the cutoff, the distance is another bound and may be measured again below.
                 bounds[number] = np.inf if measured.distance <= cutoff else measured.distance
                 if measured.distance < cutoff:
@@ -214,29 +218,27 @@ class _OutsidePairs:
             if found is not None:
                 nearest = min(nearest, found.distance)
                 near.append(_Near(names, found.distance, self._points(gauge, found)))
-        while True:
-            number = int(bounds.argmin())
-            cutoff = min(nearest, self._reach)
-            if max(bounds[number], 0.0) >= cutoff:
-                break
-            measured = self._measured(gauge, at, number, bounds[number], moved[number], cutoff)
+        number = int(bounds.argmin()) if close else lowest
+        while max(bounds[number], 0.0) < (cutoff := min(nearest, self._reach)):
+            measured = self._measured(gauge, at, number, bounds[number], travel, cutoff)
             bounds[number] = np.inf
             nearest = min(nearest, measured.distance)
+            number = int(bounds.argmin())
         return (nearest if nearest <= self._reach else np.inf), near
 
     def _measured(
-        self, gauge: Gauge, at: Placed, number: int, bound: float, moved: float, cutoff_m: float
+        self, gauge: Gauge, at: Placed, number: int, bound: float, travel: FloatArray, cutoff_m: float
     ) -> _Measured:
         """Measure a pair; the distance is exact up to the cutoff, and a lower bound beyond.
 
         Args:
             bound: Lower bound of the pair's distance.
-            moved: Distance that the arm's body has travelled.
+            travel: (b,) distances that the arm's bodies have travelled [m].
         """
         one, other = self._pairs[number]
         body, sweep = self._arm.bodies[one], self._sweeps[other]
         distance, place = distance_to_sweep(gauge, body, at[one], sweep, cutoff_m)
-        self._known[number] = distance + moved
+        self._known[number] = distance + travel[one]
         step = float(at.steps[one])
         before = bound + step
         if at.joined and before > TOUCH_M and 0.0 < distance < step:

@@ -77,9 +77,12 @@ def travelled(bodies: tuple[Body, ...], placements: FloatArray) -> FloatArray:
     Between two samples, a body is within half of their difference from one of them.
     """
     steps = np.zeros(placements.shape[:2])
-    # In a rigid motion, no point of a box travels farther than its corners.
-    moved = np.diff(corners_along(bodies, placements), axis=0)
-    steps[1:] = np.sqrt((moved * moved).sum(axis=3).max(axis=2))
+    changes = np.diff(placements, axis=0)
+    for number, body in enumerate(bodies):
+        # In a rigid motion, no point of a box travels farther than its corners.
+        corners = body.center + _CORNERS * body.half
+        moved = changes[:, number, :3, :3] @ corners.T + changes[:, number, :3, 3:]
+        steps[1:, number] = np.sqrt(np.einsum("mic,mic->mc", moved, moved).max(axis=1))
     return np.cumsum(steps, axis=0)
 
 

@@ -97,16 +97,17 @@ def swept_region(arm: Arm, placements: FloatArray) -> SweptRegion:
 
 
 def sweeps_of(
-    cell: Cell, robot: str, others: Mapping[str, FloatArray], *, passed: SweptRegion, within_m: float
+    cell: Cell, robot: str, others: Mapping[str, FloatArray], *, placements: FloatArray, within_m: float
 ) -> list[Sweep]:
     """Return the sweeps of a cell's fixtures and of the other robots.
 
     Args:
         others: See `path_encounters`.
-        passed: The boxes that the checked arm sweeps.
-        within_m: Leave out moving bodies that are farther than this from these boxes.
+        placements: (m, bodies, 4, 4) at samples of the checked arm's path, to the site [m].
+        within_m: Leave out moving bodies that are farther than this from what the checked arm sweeps.
     """
     found = []
+    passed: SweptRegion | None = None
     fixtures = cell.fixtures
     for name, body, placement in zip(fixtures.names, fixtures.bodies, fixtures.placements, strict=True):
         found.append(_at_rest(name, body, placement))
@@ -125,6 +126,7 @@ def sweeps_of(
             if not (moves and lines)
         ]
         if lines:
+            passed = passed or swept_region(cell.arms[robot], placements)
             found += _swept(arm, np.array([*lines.values()]), passed, within_m)
     return found
 
@@ -159,6 +161,8 @@ def distance_to_sweep(gauge: Gauge, body: Body, at: Any, sweep: Sweep, cutoff_m:
     Args:
         at: Coal's form of the body's placement.
     """
+    if len(sweep.travel) == 1:
+        return gauge.distance(body, at, sweep.body, sweep.place(0)), 0
     between = sweep.between_m
     least = _least(gauge, body, at, sweep, 0, len(sweep.travel), max(cutoff_m, between))
     return (0.0, least[1]) if least[0] <= between else least

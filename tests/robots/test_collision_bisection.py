@@ -9,7 +9,7 @@ from robots.checks.check import check_plan
 from robots.collision import Cell, allowed_positions, build_cell, outside_nearest, path_encounters
 from robots.collision.distance import Gauge
 from robots.collision.path import placements_along
-from robots.collision.swept_volumes import sweeps_of, swept_region
+from robots.collision.swept_volumes import sweeps_of
 from robots.descriptions.cells import CellDescription, CellRobot
 from robots.programs.steps import CheckReport, Step, StepKind, ViolationKind
 from tests.robots.boxes import bar_arm, block, cell_of, placed, two_cheeks
@@ -107,11 +107,11 @@ def test_two_pieces_are_encountered_in_order(tmp_path: Path) -> None:
 def test_long_path_is_sampled_only_near_the_arm_and_each_line_once(cell_of_two: Cell) -> None:
     arm = cell_of_two.arms["arm"]
     places = placements_along(arm, np.linspace([-0.3, 0.0], [0.3, 0.0], 50))
-    passed = swept_region(arm, places)
     aside, across = [1.5, 0.0], [np.pi, 0.0]
 
     def sampled(way: list[list[float]]) -> int:
-        sweeps = sweeps_of(cell_of_two, "arm", {"other": np.array(way)}, passed=passed, within_m=0.05)
+        others = {"other": np.array(way)}
+        sweeps = sweeps_of(cell_of_two, "arm", others, placements=places, within_m=0.05)
         return sum(len(sweep.travel) for sweep in sweeps if len(sweep.travel) > 1)
 
     assert sampled([[0.0, 0.0], aside]) == 0
