@@ -2,6 +2,7 @@
 
 import asyncio
 import gc
+import importlib.util
 import inspect
 import logging
 import sys
@@ -140,6 +141,10 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if session.config.getoption("--keep-durations") and not hasattr(session.config, "workerinput"):
         distribution.keep(_took_s)
 
+
+needs_eaik = pytest.mark.skipif(
+    importlib.util.find_spec("eaik") is None, reason="eaik is not installed: it has no wheel for this Python"
+)
 
 # ------------------------------------------------------------------------ --quick
 

@@ -29,6 +29,13 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_DEPTH}}}")
 _BRACKET = re.compile(r"[\[\]{}]")
 
 
+class _TomlError(tomllib.TOMLDecodeError):
+    """An error without a place; since Python 3.14 the base class warns of one."""
+
+    def __init__(self, problem: str) -> None:
+        ValueError.__init__(self, problem)
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """Parse a TOML file.
 
@@ -54,7 +61,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError:
         raise
     except (ValueError, RecursionError) as error:  # a number of too many digits is a plain ValueError
-        raise tomllib.TOMLDecodeError(str(error)) from None
+        raise _TomlError(str(error)) from None
 
 
 def check_bounds(text: str) -> None:
@@ -64,16 +71,16 @@ def check_bounds(text: str) -> None:
         tomllib.TOMLDecodeError: If the text is longer than MOST_CHARACTERS or nested deeper than MOST_DEPTH.
     """
     if len(text) > MOST_CHARACTERS:
-        raise tomllib.TOMLDecodeError(f"the file is longer than {MOST_CHARACTERS:,} characters")
+        raise _TomlError(f"the file is longer than {MOST_CHARACTERS:,} characters")
     bare = _bare(text)
     long_key = _LONG_KEY.search(bare)
     if long_key is not None:
-        raise tomllib.TOMLDecodeError(f"a key has more than {MOST_DEPTH} parts: '{long_key[0][:40]}...'")
+        raise _TomlError(f"a key has more than {MOST_DEPTH} parts: '{long_key[0][:40]}...'")
     depth = 0
     for bracket in _BRACKET.finditer(bare):
         depth += 1 if bracket[0] in "[{" else -1
         if depth > MOST_DEPTH:
-            raise tomllib.TOMLDecodeError(f"tables and lists are nested deeper than {MOST_DEPTH}")
+            raise _TomlError(f"tables and lists are nested deeper than {MOST_DEPTH}")
 
 
 def _bare(text: str) -> str:

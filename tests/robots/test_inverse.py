@@ -26,6 +26,7 @@ from robots.kinematics.inverse import (
 from robots.kinematics.joints import violations
 from robots.kinematics.model import build_model, tool_placement
 from robots.schema.errors import JointCountError, PoseError
+from tests.conftest import needs_eaik
 from tests.robots.arms import allowed_positions, arm, dh_arm, reached, telescope
 
 installed = pytest.mark.skipif(example_folder() is None, reason="./dev example-robots is not installed")
@@ -50,6 +51,7 @@ def test_reachable_poses_are_solved_within_limits(name: str, task: Task) -> None
         assert violations(model.joints, result.solutions[0]) == ()
 
 
+@needs_eaik
 @pytest.mark.parametrize(
     ("name", "analytic"),
     [("pt500", True), ("puma560", True), ("offsets", True), ("crooked", False)]
@@ -80,6 +82,7 @@ def test_without_eaik_poses_are_solved_by_search_and_one_line_says_so(
         assert reached(model, result.solutions[0], target, roll=True) < 1e-8
 
 
+@needs_eaik
 def test_all_postures_of_a_puma_are_found_once_each() -> None:
     _, model, solver = arm("offsets")  # no joint is beyond its limits
     for positions in allowed_positions(model, 20):
@@ -92,6 +95,7 @@ def test_all_postures_of_a_puma_are_found_once_each() -> None:
         assert len(np.unique(np.round(turns, 5), axis=0)) == 8
 
 
+@needs_eaik
 def test_solutions_are_sorted_by_distance_and_a_single_one_is_the_nearest() -> None:
     _, model, solver = arm("puma560")
     width = model.joints.upper - model.joints.lower
@@ -115,6 +119,7 @@ def test_joint_of_two_turns_is_solved_at_the_nearest_turn(turn: float) -> None:
     np.testing.assert_allclose(found.solutions[0], positions, atol=1e-8)
 
 
+@needs_eaik
 def test_free_roll_leaves_the_last_joint_where_it_was() -> None:
     _, model, solver = arm("pt600")
     near = model.joints.home.copy()

@@ -15,6 +15,7 @@ from robots.kinematics.inverse import build_solver
 from robots.kinematics.model import build_model, tool_placement
 from services.command_line.main import run
 from services.kinematics.worker.inverse import inverse_answer
+from tests.conftest import needs_eaik
 from tests.refusals import refused
 
 MODEL = build_model(load("pt600"))
@@ -32,6 +33,7 @@ def asked(
     return status, [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 
 
+@needs_eaik
 def test_each_request_line_gets_an_answer_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,6 +92,7 @@ def test_a_line_without_solution_has_the_reason_and_exit_status_1(
     assert answer["residual_m"] > 8
 
 
+@needs_eaik
 def test_arguments_and_printed_solutions_are_in_degrees_and_millimetres(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -124,6 +127,7 @@ def test_invalid_arguments_end_with_2(
     assert error in capsys.readouterr().err
 
 
+@needs_eaik
 def test_a_request_on_the_mesh_gets_solutions_or_the_reason() -> None:
     solver = build_solver(load("pt600"))
     request = schema.InverseRequest(pose=TOOL.ravel(), task=SIX_D, near=POSITIONS, all_solutions=True)
