@@ -2,15 +2,16 @@
 
     stop             Zenoh's thread -> event loop, immediately
     command, lease   queue -> thread of a paced callback -> event loop, one at a time
-    other requests   ring  -> reading thread -> event loop, in the same way
+    other requests   queue -> thread of a callback -> event loop, in the same way; those of a flood by a ring
 
 With a plain callback Python would run for each request as fast as requests arrive: the event loop would wait
 for the interpreter lock again and again, and Zenoh's queue in front of the callback blocks the whole session
 when it is full. So a thread takes a few requests each millisecond. The requests to a gateway have separate
 connections, one for control and one for the audit log and the cell, where blocking is intended: a flood waits
 at its sender and takes no processor time from a stop. Other requests share a connection, which must not
-block: they wait in a ring, and Zenoh ends a request that the ring drops without an answer. A thread that
-reads a ring wakes up ten times a second to notice signals, the thread of a callback only for requests.
+block: they wait in a ring, and Zenoh ends a request that the ring drops without an answer. It is not Zenoh's
+own ring: a thread that reads one wakes up ten times a second to notice signals, the thread of a callback only
+for requests.
 """
 
 import asyncio
@@ -22,8 +23,8 @@ from typing import Any
 
 import zenoh
 
-# The reading thread runs again long before a flood fills this ring.
-RING = 1024
+# Requests of a flood that wait for their turn.
+_RING = 1024
 # A thread takes a few requests, then leaves the interpreter to the event loop. Without the pause the system
 # often suspends this thread while it holds the interpreter lock, and a stop waits for it.
 _BATCH = 32
@@ -107,24 +108,6 @@ class RoundRobin:
         return None
 
 
-def read(ring: zenoh.Handler[zenoh.Query], take: Callable[[zenoh.Query], None]) -> None:
-    """Pass each query to `take` until the queryable is undeclared. Runs in its own thread."""
-    while True:
-        try:
-            query: zenoh.Query | None = ring.recv()
-            for _ in range(_BATCH):
-                if query is None:
-                    break
-                take(query)
-                query = ring.try_recv()
-            else:
-                if query is not None:
-                    take(query)
-                    time.sleep(_PAUSE_S)
-        except zenoh.ZError:  # undeclared
-            return
-
-
 def paced(
     take: Callable[[zenoh.Query], None], *, in_background: bool = False
 ) -> Callable[[zenoh.Query], None]:
@@ -149,6 +132,48 @@ def paced(
             time.sleep(pause_s)
 
     return take_paced
+
+
+def spilling(take: Callable[[zenoh.Query], None]) -> Callable[[zenoh.Query], None]:
+    """Return a callback that passes a few queries a millisecond to `take`; those of a flood wait in a ring.
+
+    Zenoh calls it in a thread of its own, and never waits for it long. A full ring drops its oldest query.
+    """
+    loop = asyncio.get_running_loop()
+    waiting = deque[zenoh.Query](maxlen=_RING)
+    lock = threading.Lock()
+    flooded = False
+    begun_s = 0.0
+    taken = 0
+
+    def take_or_keep(query: zenoh.Query) -> None:
+        nonlocal begun_s, taken, flooded
+        with lock:
+            if (now_s := time.monotonic()) - begun_s > _PAUSE_S:
+                begun_s, taken = now_s, 0
+            taken += 1
+            if flooded:
+                waiting.append(query)
+                return
+            if taken > _BATCH and not loop.is_closed():
+                waiting.append(query)
+                flooded = True
+                loop.call_soon_threadsafe(loop.call_later, _PAUSE_S, take_waiting)
+                return
+        take(query)
+
+    def take_waiting() -> None:
+        nonlocal flooded
+        for _ in range(_BATCH):
+            with lock:
+                flooded = bool(waiting)
+                if not flooded:
+                    return
+                query = waiting.popleft()
+            take(query)
+        loop.call_later(_PAUSE_S, take_waiting)
+
+    return take_or_keep
 
 
 def begin_now(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, None]) -> asyncio.Task[None] | None:

@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import math
-import threading
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -22,7 +21,7 @@ from robomesh.errors import BusyError, KeyNameError, MessageError, QuotaError, R
 from robomesh.reasons import RETRY, Reason, to_parameters
 from robomesh.requests import chunked_replies
 from robomesh.requests.latencies import Latencies
-from robomesh.requests.request_queue import RING, Queue, RateLimit, RoundRobin, begin_now, paced, read
+from robomesh.requests.request_queue import Queue, RateLimit, RoundRobin, begin_now, paced, spilling
 
 log = logging.getLogger(__name__)
 
@@ -148,7 +147,7 @@ class RequestServer:
         self._unanswered: dict[str, int] = {}
         self._waiting = 0
         self._most_of_one = _MOST_OF_ONE if "*" in name else _MOST
-        self._counting = Lock()  # the reading thread counts up, the loop's down
+        self._counting = Lock()  # Zenoh's thread counts up, the loop's down
         self._scheduler = scheduler
         self._queue = Queue(limited=bool(self._row.own_link) and not self._row.unread)
         self._busy_answers = RateLimit(per_s=_BUSY_PER_S, burst=_BUSY_BURST)
@@ -168,10 +167,7 @@ class RequestServer:
             take = paced(self._hand_over, in_background=in_background)
             self._queryable = session.declare_queryable(key, take)
         else:
-            self._queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(RING))
-            reading = (self._queryable.handler, self._hand_over)
-            # Not a daemon, as in `Subscription`.
-            threading.Thread(target=read, args=reading, name=f"read {key}").start()
+            self._queryable = session.declare_queryable(key, spilling(self._hand_over))
 
     @property
     def closed(self) -> bool:

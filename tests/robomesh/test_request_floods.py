@@ -9,7 +9,8 @@ import pytest
 from robomesh.contract.keys import Key
 from robomesh.contract.messages import PROTOBUF
 from robomesh.errors import BusyError
-from robomesh.requests.request_queue import RateLimit, begin_now, paced
+from robomesh.requests import request_queue
+from robomesh.requests.request_queue import RateLimit, begin_now, paced, spilling
 from robomesh.requests.requests import ask_all
 from robomesh.requests.server import Request
 from robomesh.schemas import robomesh_pb2 as schema
@@ -239,3 +240,18 @@ def test_a_flood_in_the_background_waits_longer_at_its_sender():
         take(None)
     assert len(taken) == 100
     assert time.monotonic() - began_s >= 0.02
+
+
+async def test_a_flood_that_must_not_block_waits_in_a_ring_which_drops_the_oldest():
+    taken, most = [], request_queue._RING + request_queue._BATCH
+    take = spilling(taken.append)
+    for number in range(2 * most):  # before the event loop runs again
+        take(number)
+    at_once = len(taken)
+    # After a longer pause than a millisecond a few more are taken at once.
+    assert request_queue._BATCH <= at_once < most
+    await until(lambda: len(taken) == at_once + request_queue._RING)
+    assert taken[at_once:] == [*range(2 * most - request_queue._RING, 2 * most)]
+    await asyncio.sleep(0.01)
+    take("after")
+    assert taken[-1] == "after"
