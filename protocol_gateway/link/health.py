@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
+import numpy as np
+
 from protocol_gateway.link.timestamping import EventTime
 from protocol_gateway.seam import ControllerEvent, Refused, StatusReceived
 
@@ -54,11 +56,11 @@ class Arrivals:
 
     def jitter_s(self, now_s: float) -> float | None:
         """Return the jitter of unit intervals within the last 5 s: 99th percentile minus median."""
-        times_s = [each for each in self._times_s if now_s - each < _WINDOW_S]
-        if len(times_s) <= _FEW:
+        times_s = np.array(self._times_s)
+        spans_s = np.sort(np.diff(times_s[now_s - times_s < _WINDOW_S]))
+        if len(spans_s) < _FEW:
             return None
-        spans_s = sorted(later - earlier for earlier, later in pairwise(times_s))
-        return spans_s[(len(spans_s) - 1) * 99 // 100] - spans_s[len(spans_s) // 2]
+        return float(spans_s[(len(spans_s) - 1) * 99 // 100] - spans_s[len(spans_s) // 2])
 
 
 class AnswerTimes:

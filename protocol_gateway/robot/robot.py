@@ -103,9 +103,10 @@ class Robot:
         self._others: set[str] = set()
 
         publisher = self._publisher
-        self._controller_topic, self._lease_topic = publisher("controller"), publisher("lease")
-        self._audit_topic, self._program_topic = publisher("audit"), publisher("program")
-        self._units_topic = publisher("units")
+        self._controller_topic, self._lease_topic, self._program_topic, self._units_topic = (
+            publisher(topic, together=True) for topic in ("controller", "lease", "program", "units")
+        )
+        self._audit_topic = publisher("audit")
         self._journal = Journal(publisher("events"), settings.name)
         self._set_up_path = audit_path.with_suffix(".tool")
         confirmed = set_up_file.read(self._set_up_path)
