@@ -92,7 +92,7 @@ class ArmPublisher:
     def __init__(self, session: Session, arm: FollowedArm, cell_state: CellState, shown: ShownCell) -> None:
         self._arm, self._cell_state, self._shown = arm, cell_state, shown
         self._frames = session.declare_publisher(arm.site, arm.name, "frames", together=True)
-        self._kinematics = session.declare_publisher(arm.site, arm.name, "kinematics")
+        self._kinematics = session.declare_publisher(arm.site, arm.name, "kinematics", together=True)
         self._events = session.declare_publisher(arm.site, arm.name, "events/kinematics")
         self._frames_limit = _RateLimit(self._frames.topic.rate_hz)
         self._kinematics_limit = _RateLimit(self._kinematics.topic.rate_hz)
