@@ -34,8 +34,9 @@ from tests.ports import free_port
 JOINTS = ("waist", "shoulder", "elbow", "wrist", "roll")
 VIEWS = ("front", "top", "left", "free")
 ARM = "robomesh/hall/arm"
-# Requested views in full size and rate are an eighth of these.
-_MANY = 256
+# Requested views in full size have the capacity of an eighth of these, or of three eighths at 10 a second,
+# which is the least that counts: 96, if no other view was asked for.
+_MANY, _MOST_HZ, _MOST_ASKED = 256, 10.0, 32
 _FIRST_WITHIN_S = 30.0
 
 
@@ -86,9 +87,10 @@ async def watch(
             result["first_ms"]["own view"] = [
                 await first_ms(monitor, f"{ARM}/video/{view}") for _ in range(5) for view in VIEWS
             ]
-            result["first_ms"]["a view that was asked for"] = [
-                await asked_ms(monitor, number) for number in range(8)
-            ]
+            if max(views for views, _ in steps) < _MOST_ASKED:
+                result["first_ms"]["a view that was asked for"] = [
+                    await asked_ms(monitor, number) for number in range(8)
+                ]
             for views, watchers in steps:
                 result["rates"].append(await rates(monitor, renderer, views, watchers, seconds))
             return result
@@ -151,9 +153,9 @@ async def rates(
             counts[number] += 1
 
     tasks = [asyncio.create_task(count(number)) for number in range(len(watched))]
-    # A view's first picture opens its encoder.
+    # A view's first picture opens its encoder, the second draws the backdrop that is kept.
     until = time.monotonic() + _FIRST_WITHIN_S
-    while not all(counts) and time.monotonic() < until:
+    while min(counts) < 2 and time.monotonic() < until:
         await asyncio.sleep(0.1)
     await asyncio.sleep(1.0)
     counts[:] = [0] * len(watched)
@@ -180,6 +182,7 @@ async def requested(monitor: Session, number: int) -> str:
     view = View(projection=View.PERSPECTIVE)
     view.eye.x, view.eye.y, view.eye.z = 2.4 * math.cos(angle), 2.4 * math.sin(angle), 1.2
     view.target.z = 0.45
-    answer = await monitor.ask(f"{ARM}/views/{monitor.own_name}", ViewRequest(view=view), timeout_s=5.0)
+    request = ViewRequest(view=view, fps=_MOST_HZ)
+    answer = await monitor.ask(f"{ARM}/views/{monitor.own_name}", request, timeout_s=5.0)
     assert isinstance(answer, ViewAnswer)
     return answer.topic
