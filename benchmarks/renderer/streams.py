@@ -5,7 +5,7 @@
 
 The program starts a site: router, a robot that moves at 100 Hz, kinematics, and the renderer in a separate
 process, whose CPU is measured. This process watches the streams. More than four views are requested ones,
-around the robot.
+around the robot, with at most 10 pictures a second.
 """
 
 import asyncio

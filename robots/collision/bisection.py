@@ -59,7 +59,9 @@ class Placed:
 
 
 def joined(steps: FloatArray) -> list[bool]:
-    """Return whether the arm moves from the previous sample to each; after a larger step a new path begins.
+    """Return for each sample whether the arm moved to it from the previous one.
+
+    After a larger step a new path begins.
 
     Args:
         steps: (m, b) distances that the bodies travelled since the previous sample [m].
